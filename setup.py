@@ -1,4 +1,5 @@
-"""The folder exercises/ is shipped as the package kfcourse.exercises; everything else is said in pyproject.toml."""
+"""The folder exercises/ is shipped as the package kfcourse.exercises; everything else is said in
+pyproject.toml."""
 
 from setuptools import find_namespace_packages, find_packages, setup
 

@@ -1,4 +1,5 @@
-"""Code that readers see fits the column of a page: at most 78 columns in the cells of chapters and exercises.
+"""Code that readers see fits the column of a page: at most 78 columns in the cells of chapters and
+exercises.
 
 python .ci/columns.py [FILE ...]      all of them, or these
 """
@@ -17,14 +18,19 @@ def long_lines(path: Path) -> list[str]:
     found, inside = [], False
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         if line.lstrip().startswith("```"):
-            inside = (not inside and "{code-cell}" in line) or line.lstrip().startswith(("```python", "```bash"))
+            inside = (not inside and "{code-cell}" in line) or line.lstrip().startswith(
+                ("```python", "```bash")
+            )
         elif inside and not line.startswith(":") and len(line) > COLUMNS:
             found.append(f"{path}:{number}: {len(line)} columns, {COLUMNS} fit the page")
     return found
 
 
 def main(names: list[str]) -> int:
-    paths = [Path(name) for name in names] or [*ROOT.glob("book/*.md"), *ROOT.glob("exercises/*/statement.md")]
+    paths = [Path(name) for name in names] or [
+        *ROOT.glob("book/*.md"),
+        *ROOT.glob("exercises/*/statement.md"),
+    ]
     found = [line for path in sorted(paths) for line in long_lines(path)]
     print("\n".join(found) or f"{len(paths)} pages: all code fits {COLUMNS} columns")
     return bool(found)

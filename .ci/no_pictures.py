@@ -1,4 +1,5 @@
-"""For kernels that execute notebooks again (PYTHONSTARTUP): nbval compares no pictures, so none is drawn."""
+"""For kernels that execute notebooks again (PYTHONSTARTUP): nbval compares no pictures, so none is
+drawn."""
 
 from IPython.core import pylabtools
 

@@ -4,13 +4,14 @@
 
 Prints
 - the linearised AOF, random numbers included, against filterpy's extended Kalman filter in a loop;
-- all seven filters of the lab, designed on one ensemble and compared on another, against the time one NumPy
-  Generator needs to draw as many normal numbers (four for each trajectory and step), also in processor time, which other
-  work on the machine disturbs less;
+- all seven filters of the lab, designed on one ensemble and compared on another, against the time
+  one NumPy Generator needs to draw as many normal numbers (four for each trajectory and step), also
+  in processor time, which other work on the machine disturbs less;
 - the same beside the exact one, on one core and on several;
 - how the cost grows with runs and steps, and what share drawing and each filter take.
 
-Absolute figures move with the machine; the ratios are what to keep.  Nothing else should run meanwhile.
+Absolute figures move with the machine; the ratios are what to keep.  Nothing else should run
+meanwhile.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ from kfcourse.montecarlo.ensemble import Ensemble
 STEPS = 51
 
 
-def best(work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.perf_counter) -> float:
+def best(
+    work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.perf_counter
+) -> float:
     """Shortest time of several, in seconds: the least disturbed one."""
     times = []
     for _ in range(repeats):
@@ -41,7 +44,8 @@ def best(work: Callable[[], object], repeats: int, clock: Callable[[], float] = 
 
 
 def filterpy_loop(runs: int) -> Callable[[], object]:
-    """Variant 53's LAOF as filterpy's users write it: an object for each trajectory, a loop over steps."""
+    """Variant 53's LAOF as filterpy's users write it: an object for each trajectory, a loop over
+    steps."""
     c, e, g, f = 0.9, 0.05, 1.0, 0.02
     _, y = simulate(find_variant("53").model, runs, STEPS, seed=1)
 
@@ -79,9 +83,13 @@ def main() -> None:
     model = find_variant("53").model
     filters = lab_filters(model)
 
-    def lab(names=LAB, runs=options.runs[0], steps=STEPS, jobs=options.threads) -> Callable[[], object]:
+    def lab(
+        names=LAB, runs=options.runs[0], steps=STEPS, jobs=options.threads
+    ) -> Callable[[], object]:
         chosen = [one for one in filters if one.name in names]
-        return lambda: compare(chosen, model, runs, steps, seed=1, design_runs=runs, jobs=jobs, progress=False)
+        return lambda: compare(
+            chosen, model, runs, steps, seed=1, design_runs=runs, jobs=jobs, progress=False
+        )
 
     loop = best(filterpy_loop(200), options.repeats) / (200 * STEPS)
     print(f"filterpy EKF loop: {1e6 * loop:.1f} us a trajectory-step")
@@ -93,22 +101,41 @@ def main() -> None:
         print(f"\n{runs} trajectories x {STEPS} steps")
         print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step")
         print(f"  filterpy's loop takes {loop / one:.0f} times as long")
-        print(f"  drawing 4 normals a trajectory-step with one Generator: {1e9 * drawing / count:.1f} ns")
+        print(
+            f"  drawing 4 normals a trajectory-step with one Generator: "
+            f"{1e9 * drawing / count:.1f} ns"
+        )
         seven = best(lab(runs=runs), options.repeats)
         of_seven = best(lab(runs=runs), options.repeats, time.process_time)
-        print(f"  seven filters, designed and run: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times that,")
-        print(f"    {of_seven / of_drawing:.2f} times in processor time, of {options.threads} threads")
+        print(
+            f"  seven filters, designed and run: {1e9 * seven / count:.1f} ns = "
+            f"{seven / drawing:.2f} times that,"
+        )
+        print(
+            f"    {of_seven / of_drawing:.2f} times in processor time, of {options.threads} threads"
+        )
 
     print("\nWith the exact filter, 2000 trajectories x 51 steps")
     filters = lab_filters(model, [*LAB, "aof-exact"])
     for jobs in (1, 2):
-        print(f"  {jobs} cores: {best(lab([*LAB, 'aof-exact'], 2000, jobs=jobs), options.repeats):.2f} s")
+        print(
+            f"  {jobs} cores: "
+            f"{best(lab([*LAB, 'aof-exact'], 2000, jobs=jobs), options.repeats):.2f} s"
+        )
 
     print("\nGrowth of the cost of all seven filters")
-    for runs, steps in ((50_000, STEPS), (100_000, STEPS), (200_000, STEPS), (400_000, STEPS), (100_000, 102), (100_000, 204)):
+    for runs, steps in (
+        (50_000, STEPS),
+        (100_000, STEPS),
+        (200_000, STEPS),
+        (400_000, STEPS),
+        (100_000, 102),
+        (100_000, 204),
+    ):
         seconds = best(lab(runs=runs, steps=steps), options.repeats)
         print(
-            f"  {runs:7d} runs x {steps:3d} steps: {seconds:6.2f} s, {1e9 * seconds / (runs * steps):6.1f} ns a trajectory-step"
+            f"  {runs:7d} runs x {steps:3d} steps: {seconds:6.2f} s, "
+            f"{1e9 * seconds / (runs * steps):6.1f} ns a trajectory-step"
         )
 
     runs = options.runs[0]
@@ -119,12 +146,18 @@ def main() -> None:
         for _ in Ensemble(model, runs, STEPS, np.random.SeedSequence(1)):
             pass
 
-    print(f"  drawing and simulating one ensemble {1e9 * best(trajectories, options.repeats) / count:8.1f}")
+    print(
+        f"  drawing and simulating one ensemble "
+        f"{1e9 * best(trajectories, options.repeats) / count:8.1f}"
+    )
 
     def alone(names) -> float:
         chosen = [one for one in filters if one.name in names]
         return best(
-            lambda: compare(chosen, model, runs, STEPS, seed=1, design_runs=runs, jobs=1, progress=False), options.repeats
+            lambda: compare(
+                chosen, model, runs, STEPS, seed=1, design_runs=runs, jobs=1, progress=False
+            ),
+            options.repeats,
         )
 
     base = alone(["aof-linearised"])

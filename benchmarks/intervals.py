@@ -1,12 +1,16 @@
-"""How often the intervals of a comparison hold the truth, at all steps, with the defaults of `kfcourse lab`.
+"""How often the intervals of a comparison hold the truth, at all steps, with the defaults of
+`kfcourse lab`.
 
-    .venv/bin/python benchmarks/intervals.py [--variants 53 5 7 2] [--seeds 200] [--runs 20000] [--jobs 2]
+    .venv/bin/python benchmarks/intervals.py [--variants 53 5 7 2] [--seeds 200] [--runs 20000]
+        [--jobs 2]
 
-For each variant the lab's filters are designed once, and compared on fresh trajectories with each seed.  The truth is the mean
-over the seeds.  Printed are, for gaps, differences from the control, mean gaps and their differences: the coverage over all
-filters and steps, that of the worst place, and how probable so bad a place would be among so many if each covered with `LEAST`.
-Then the filters are designed again, with `--designs` other seeds, and run on one and the same sample: how much another design
-moves a gap, its standard deviation in units of the interval's whole width, in the median over filters and steps and at most.
+For each variant the lab's filters are designed once, and compared on fresh trajectories with each
+seed.  The truth is the mean over the seeds.  Printed are, for gaps, differences from the control,
+mean gaps and their differences: the coverage over all filters and steps, that of the worst place,
+and how probable so bad a place would be among so many if each covered with `LEAST`. Then the
+filters are designed again, with `--designs` other seeds, and run on one and the same sample: how
+much another design moves a gap, its standard deviation in units of the interval's whole width, in
+the median over filters and steps and at most.
 """
 
 from __future__ import annotations
@@ -52,13 +56,16 @@ def questions(result: Comparison) -> dict[str, list[Estimate]]:
     return {
         "gap": [result.gap(name) for name in (result.entrants if result.has_bound else others)],
         "difference": [result.difference(name, control) for name in others],
-        "mean gap": [result.mean_gap(name) for name in (result.entrants if result.has_bound else others)],
+        "mean gap": [
+            result.mean_gap(name) for name in (result.entrants if result.has_bound else others)
+        ],
         "difference of means": [result.mean_gap_difference(name, control) for name in others],
     }
 
 
 def coverage(estimates: Sequence[Sequence[Estimate]]) -> tuple[float, float, float]:
-    """Of (seeds, filters) estimates: over all places, at the worst, and how probable so bad a place is.
+    """Of (seeds, filters) estimates: over all places, at the worst, and how probable so bad a place
+    is.
 
     Where the truth varies by rounding only (filters that coincide) there is nothing to be covered.
     """
@@ -80,10 +87,15 @@ def another_design(
     designs: int,
     jobs: int,
 ) -> tuple[float, float]:
-    """Standard deviation of the designed filters' gaps over designs, over the width of the interval: median and largest."""
-    ensembles = [Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 1000 + i) for i in range(designs)]
+    """Standard deviation of the designed filters' gaps over designs, over the width of the
+    interval: median and largest."""
+    ensembles = [
+        Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 1000 + i) for i in range(designs)
+    ]
     work = {"jobs": jobs, "progress": False}
-    results = [compare(designed(filters, one, jobs), model, runs, steps, 1, **work) for one in ensembles]
+    results = [
+        compare(designed(filters, one, jobs), model, runs, steps, 1, **work) for one in ensembles
+    ]
     names = [one.name for one in filters if isinstance(one, Design)]
     gaps = np.array([[result.gap(name).value for name in names] for result in results])
     widths: Array = np.array([2 * results[0].gap(name).half_width() for name in names])
@@ -98,9 +110,18 @@ def line(name: str, seeds: int, runs: int, steps: int | None, designs: int, jobs
     filters = filters_of(name)
     model, work = variant.model, {"jobs": jobs, "progress": False}
     ready = designed(filters, Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 0), jobs)
-    results = [questions(compare(ready, model, runs, steps, seed, **work)) for seed in range(1, 1 + seeds)]
-    cells = ["{:6.3f} {:6.3f} {:6.2f}".format(*coverage([one[kind] for one in results])) for kind in results[0]]
-    moved = "{:6.2f} {:6.2f}".format(*another_design(filters, model, runs, steps, designs, jobs)) if designs > 1 else " " * 13
+    results = [
+        questions(compare(ready, model, runs, steps, seed, **work)) for seed in range(1, 1 + seeds)
+    ]
+    cells = [
+        "{:6.3f} {:6.3f} {:6.2f}".format(*coverage([one[kind] for one in results]))
+        for kind in results[0]
+    ]
+    moved = (
+        "{:6.2f} {:6.2f}".format(*another_design(filters, model, runs, steps, designs, jobs))
+        if designs > 1
+        else " " * 13
+    )
     return f"{name:>12} " + " | ".join([*cells, moved]) + f" | {time.monotonic() - start:6.0f}"
 
 
@@ -111,8 +132,13 @@ def main() -> None:
     for option, default in (("--seeds", 200), ("--runs", 20_000), ("--designs", 8), ("--jobs", 2)):
         parser.add_argument(option, type=int, default=default)
     args = parser.parse_args()
-    print(f"{args.seeds} seeds, {args.runs} trajectories, 95 %: mean, worst place, chance of it; another design: median, most")
-    kinds = " | ".join(f"{kind:>20}" for kind in ("gap", "difference", "mean gap", "difference of means"))
+    print(
+        f"{args.seeds} seeds, {args.runs} trajectories, 95 %: mean, worst place, chance of it; "
+        f"another design: median, most"
+    )
+    kinds = " | ".join(
+        f"{kind:>20}" for kind in ("gap", "difference", "mean gap", "difference of means")
+    )
     print(f"{'variant':>12} {kinds} | {'another design':>13} | {'s':>6}")
     for name in args.variants:
         print(line(name, args.seeds, args.runs, args.steps, args.designs, args.jobs), flush=True)

@@ -2,10 +2,11 @@
 
     .venv/bin/python benchmarks/jumps.py [--runs 5000] [--steps 10] [--repeats 5]
 
-For each shipped variant with modes the processor time of each filter, over that of the plain AOF of its first mode, and over that
-of the AOF of the average of the modes.  Of J modes a filter cannot do with less than J corrections, and J^2 is what one would
-expect that predicts from each mode to each.  The plain AOF of a linear scalar mode is no fair measure: its gain is the same for
-all trajectories, so that it multiplies and adds, while each likelihood of a mode takes an exponential.
+For each shipped variant with modes the processor time of each filter, over that of the plain AOF of
+its first mode, and over that of the AOF of the average of the modes.  Of J modes a filter cannot do
+with less than J corrections, and J^2 is what one would expect that predicts from each mode to each.
+The plain AOF of a linear scalar mode is no fair measure: its gain is the same for all trajectories,
+so that it multiplies and adds, while each likelihood of a mode takes an exponential.
 """
 
 from __future__ import annotations
@@ -40,14 +41,20 @@ def main() -> None:
         model = variant.model
         if not isinstance(model, JumpModel):
             continue
-        structures, y = JumpStructures(model), simulate(model, options.runs, options.steps, seed=1).y
+        structures, y = (
+            JumpStructures(model),
+            simulate(model, options.runs, options.steps, seed=1).y,
+        )
 
         def cost(one: Filter, y: Array = y) -> float:
             return best(lambda: run_all(one, y), options.repeats, time.process_time)
 
         plain = cost(aof(structures.best[0]))
         averaged = None if model.by_state else cost(JUMP_FILTERS["aof-averaged"].build(structures))
-        said = f"{name}: {len(model.modes)} modes, n = {model.n}; plain AOF {1e6 * plain / options.steps:.0f} us a step"
+        said = (
+            f"{name}: {len(model.modes)} modes, n = {model.n}; plain AOF "
+            f"{1e6 * plain / options.steps:.0f} us a step"
+        )
         print(f"{said} of {options.runs} trajectories")
         for short in FILTERS:
             try:

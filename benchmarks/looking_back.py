@@ -1,12 +1,15 @@
-"""What looking back and likelihood cost, as ratios to the filter's own run, side by side in one run.
+"""What looking back and likelihood cost, as ratios to the filter's own run, side by side in one
+run.
 
-    OMP_NUM_THREADS=1 python benchmarks/looking_back.py [--repeats 9] [--states 1 2 3 4 6] [--runs 1 300 5000 50000]
+    OMP_NUM_THREADS=1 python benchmarks/looking_back.py [--repeats 9] [--states 1 2 3 4 6]
+        [--runs 1 300 5000 50000]
 
-Smoother over filter, and likelihood over filter (each runs the filter itself, too), for a chain of so many states whose last one
-is driven, and the first measured: linear, whole and with a tenth of the measurements missing, by `kalman_filter`, or with the
-sine of the first in the last. And for variant 53, the pendulum of Sarkka and Svensson, an aircraft that turns, radar D3, the
-exact filter and particles. Ratios of processor times, the three one after the other in each of so many turns: their medians, and
-the smoother's worst.
+Smoother over filter, and likelihood over filter (each runs the filter itself, too), for a chain of
+so many states whose last one is driven, and the first measured: linear, whole and with a tenth of
+the measurements missing, by `kalman_filter`, or with the sine of the first in the last. And for
+variant 53, the pendulum of Sarkka and Svensson, an aircraft that turns, radar D3, the exact filter
+and particles. Ratios of processor times, the three one after the other in each of so many turns:
+their medians, and the smoother's worst.
 """
 
 from __future__ import annotations
@@ -19,7 +22,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from kfcourse import Model, gauss_hermite, gaussian, likelihood, linearised, run, simulate, smooth, unscented
+from kfcourse import (
+    Model,
+    gauss_hermite,
+    gaussian,
+    likelihood,
+    linearised,
+    run,
+    simulate,
+    smooth,
+    unscented,
+)
 from kfcourse.filters import Filter, aof, kalman_filter, particle, pointmass
 from kfcourse.lab.variants import find_variant
 from kfcourse.scenarios.benchmarks import pendulum, pendulum_data
@@ -44,14 +57,20 @@ def chain(n: int, curved: bool) -> Model:
     last = f"0.9*x{n} + 0.3*v" + (" - 0.1*sin(x1)" if curved else "")
     names = [f"x{i}" for i in range(1, n + 1)]
     motion = [*(f"{one} + 0.2*{other}" for one, other in pairwise(names)), last]
-    return Model.define(motion, "x1 + 0.5*w", symbols={"x": names}, prior={"mean": [0] * n, "variance": np.eye(n)})
+    return Model.define(
+        motion, "x1 + 0.5*w", symbols={"x": names}, prior={"mean": [0] * n, "variance": np.eye(n)}
+    )
 
 
 def turn() -> Model:
     """An aircraft that turns: place, course, speed, turn rate; a receiver."""
     place = ["x1 + 0.1*x4*cos(x3) + 0.05*v1", "x2 + 0.1*x4*sin(x3) + 0.05*v2"]
     motion = [*place, "x3 + 0.1*x5 + 0.02*v3", "x4 + 0.1*v4", "0.95*x5 + 0.05*v5"]
-    return Model.define(motion, ["x1 + 0.5*w1", "x2 + 0.5*w2"], prior={"mean": [0, 0, 0.5, 5, 0], "variance": np.eye(5)})
+    return Model.define(
+        motion,
+        ["x1 + 0.5*w1", "x2 + 0.5*w2"],
+        prior={"mean": [0, 0, 0.5, 5, 0], "variance": np.eye(5)},
+    )
 
 
 def measurements(model: Model, runs: int, gaps: bool) -> np.ndarray:
@@ -68,25 +87,40 @@ def seconds(work: Callable[[Filter, np.ndarray], object], one: Filter, y: np.nda
 
 
 def ratios(one: Filter, y: np.ndarray, repeats: int) -> str:
-    """Microseconds of the filter for a step of a run; what the smoother costs beside it, the worst, and the likelihood."""
-    times = np.array([[seconds(work, one, y) for work in (run, smooth, likelihood)] for _ in range(repeats + 1)])[1:]
+    """Microseconds of the filter for a step of a run; what the smoother costs beside it, the worst,
+    and the likelihood."""
+    times = np.array(
+        [[seconds(work, one, y) for work in (run, smooth, likelihood)] for _ in range(repeats + 1)]
+    )[1:]
     back, told = (times[:, 1:] / times[:, :1]).T
     own = 1e6 * np.median(times[:, 0]) / np.prod(y.shape[:2])
     return f"{own:8.3f} {np.median(back):5.2f} {back.max():5.2f} {np.median(told):5.2f}"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--states", type=int, nargs="*", default=[1, 2, 3, 4, 6])
     parser.add_argument("--runs", type=int, nargs="*", default=[1, 300, 5000, 50_000])
     given = parser.parse_args()
-    print(f"{'':18}" + "".join(f"{runs:>23} runs" for runs in given.runs) + "   us, smoother (median, worst), likelihood")
+    print(
+        f"{'':18}"
+        + "".join(f"{runs:>23} runs" for runs in given.runs)
+        + "   us, smoother (median, worst), likelihood"
+    )
     for kind, build in KINDS.items():
         for n in given.states:
-            one = kalman_filter(chain(n, False)) if kind == "kalman" else aof(build(chain(n, kind not in LINEAR)))
+            one = (
+                kalman_filter(chain(n, False))
+                if kind == "kalman"
+                else aof(build(chain(n, kind not in LINEAR)))
+            )
             cells = [
-                "" if kind == "gauss-hermite" and runs * 3**n * n > ROOM else ratios(one, y, given.repeats)
+                ""
+                if kind == "gauss-hermite" and runs * 3**n * n > ROOM
+                else ratios(one, y, given.repeats)
                 for runs in given.runs
                 for y in [measurements(one.model, runs, kind == "with gaps")]
             ]
@@ -98,7 +132,10 @@ def main() -> None:
         "53, gaussian, 20,000 runs": (aof(gaussian(lab)), many),
         "pendulum, unscented, 1 run": (aof(unscented(swing)), record),
         "pendulum, gaussian, 500 runs": (aof(gaussian(swing)), np.repeat(record[:60], 500, axis=1)),
-        "turn, linearised, 5,000 runs": (aof(linearised(turn())), simulate(turn(), 5000, 21, seed=1).y),
+        "turn, linearised, 5,000 runs": (
+            aof(linearised(turn())),
+            simulate(turn(), 5000, 21, seed=1).y,
+        ),
         "radar D3, linearised, 500 runs": (
             aof(linearised(radar := find_variant("D3").model)),
             simulate(radar, 500, 21, seed=1).y,
@@ -107,7 +144,10 @@ def main() -> None:
         "53, 500 particles, 20 runs": (particle(lab, 500), many[:8, :20]),
     }
     for name, (one, y) in others.items():
-        print(f"{name:32} {ratios(one, y, min(given.repeats, 4) if one.slow else given.repeats)}", flush=True)
+        print(
+            f"{name:32} {ratios(one, y, min(given.repeats, 4) if one.slow else given.repeats)}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 
     python book/build.py
 
-Sphinx itself always starts afresh, so that no warning is lost and no stale page is left; only the outputs of
-executed cells are kept (_build/.jupyter_cache), as long as the package, the requirements and the interpreter are the same.
-Where nothing at all has changed since a book was built, it stays.
+Sphinx itself always starts afresh, so that no warning is lost and no stale page is left; only the
+outputs of executed cells are kept (_build/.jupyter_cache), as long as the package, the requirements
+and the interpreter are the same. Where nothing at all has changed since a book was built, it stays.
 """
 
 from __future__ import annotations
@@ -38,14 +38,23 @@ NOT_BUILT = "\nThe book was NOT built: see the errors and warnings above."
 
 def fingerprint() -> str:
     """Hash of all that the outputs of the chapters depend on, besides their own cells."""
-    parts = (sys.version.encode(), package_digest().encode(), (ROOT / "requirements.txt").read_bytes())
+    parts = (
+        sys.version.encode(),
+        package_digest().encode(),
+        (ROOT / "requirements.txt").read_bytes(),
+    )
     return hashlib.sha256(b"\n".join(parts)).hexdigest()
 
 
 def sources() -> str:
     """Hash of all files that the book is made of, and of the interpreter."""
     digest = hashlib.sha256(sys.version.encode())
-    for path in sorted(file for name in SOURCES for file in (ROOT / name, *(ROOT / name).rglob("*")) if file.is_file()):
+    for path in sorted(
+        file
+        for name in SOURCES
+        for file in (ROOT / name, *(ROOT / name).rglob("*"))
+        if file.is_file()
+    ):
         name = path.relative_to(ROOT).as_posix()
         if not name.startswith(MADE) and "__pycache__" not in name:
             digest.update(f"{name}\n{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
@@ -72,10 +81,15 @@ def main() -> int:
         return tell()
     BUILT.unlink(missing_ok=True)
     prepare()
-    # Small matrices: several threads inside one kernel cost more than they gain, and the kernels share the processors.
+    # Small matrices: several threads inside one kernel cost more than they gain, and the kernels
+    # share the processors.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # On a new machine matplotlib announces its font cache on stderr; not in a chapter, please.
-    subprocess.run([sys.executable, "-c", "import matplotlib.font_manager"], stderr=subprocess.DEVNULL, check=True)
+    subprocess.run(
+        [sys.executable, "-c", "import matplotlib.font_manager"],
+        stderr=subprocess.DEVNULL,
+        check=True,
+    )
     failures = chapters.execute_all(CACHE, manual.solutions())
     for failure in failures:
         print(f"\nFAILED {failure}", file=sys.stderr)
@@ -86,13 +100,19 @@ def main() -> int:
     package.write()
     sample.write()
     made = chapters.executed(CACHE)
-    equations.PAGE.write_text(equations.page((name, equations.records(notebook)) for name, notebook in made), encoding="utf-8")
+    equations.PAGE.write_text(
+        equations.page((name, equations.records(notebook)) for name, notebook in made),
+        encoding="utf-8",
+    )
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
     options = ["--config", "_config.yml", "--path-output", ".", "-W", "--keep-going", "-n"]
     result = subprocess.run([*jupyter_book, "build", "book", *options], cwd=ROOT)
     if result.returncode:
         for report in sorted((BUILD / "html" / "reports").rglob("*.log")):
-            print(f"\n{report.relative_to(ROOT)}:\n{report.read_text(encoding='utf-8')}", file=sys.stderr)
+            print(
+                f"\n{report.relative_to(ROOT)}:\n{report.read_text(encoding='utf-8')}",
+                file=sys.stderr,
+            )
         shutil.rmtree(BUILD / "html", ignore_errors=True)
         print(NOT_BUILT, file=sys.stderr)
         return 1

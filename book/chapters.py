@@ -1,6 +1,7 @@
 """The chapters, executed several at once into the cache from which Sphinx takes their outputs.
 
-Sphinx would execute them one after another.  The worked solutions of the lab manual run in the same processes.
+Sphinx would execute them one after another.  The worked solutions of the lab manual run in the same
+processes.
 
     python book/chapters.py literature      execute one chapter, and print what its cells print
 """
@@ -45,7 +46,10 @@ class Executed(NamedTuple):
 def notebooks() -> list[Path]:
     """The chapters of the book that have code."""
     toc = yaml.safe_load((BOOK / "_toc.yml").read_text(encoding="utf-8"))
-    pages = [toc["root"], *(chapter["file"] for part in toc["parts"] for chapter in part["chapters"])]
+    pages = [
+        toc["root"],
+        *(chapter["file"] for part in toc["parts"] for chapter in part["chapters"]),
+    ]
     paths = [BOOK / f"{page}.md" for page in pages if not page.startswith("manual/")]
     made = [path for path in paths if path.exists()]  # the build writes a page of its own
     return [path for path in made if is_myst_markdown_notebook(path.read_text(encoding="utf-8"))]
@@ -77,7 +81,8 @@ def work(job: Path | Job) -> Executed | Outcome:
 
 
 def execute_all(folder: Path, solutions: Sequence[Job]) -> list[str]:
-    """Execute the chapters that the cache does not hold, and make the solutions; what failed, in words."""
+    """Execute the chapters that the cache does not hold, and make the solutions; what failed, in
+    words."""
     cache = get_cache(folder)
     new = [path for path in notebooks() if not _cached(cache, path)]
     failures = []
@@ -88,13 +93,16 @@ def execute_all(folder: Path, solutions: Sequence[Job]) -> list[str]:
         elif done.failure:
             failures.append(done.failure)
         else:
-            bundle = CacheBundleIn(done.notebook, str(done.path), data={"execution_seconds": done.seconds})
+            bundle = CacheBundleIn(
+                done.notebook, str(done.path), data={"execution_seconds": done.seconds}
+            )
             cache.cache_notebook_bundle(bundle, check_validity=False, overwrite=True)
     return failures
 
 
 def executed(folder: Path) -> Iterator[tuple[str, NotebookNode]]:
-    """The documents of the chapters with code, in the order of the book, each with its outputs from the cache."""
+    """The documents of the chapters with code, in the order of the book, each with its outputs from
+    the cache."""
     cache = get_cache(folder)
     for path in notebooks():
         _, notebook = cache.merge_match_into_notebook(myst_nb_reader_plugin(str(path)))

@@ -1,7 +1,9 @@
-"""Sphinx extension: what each typed relation is, under its display, and in a word at the end of its box.
+"""Sphinx extension: what each typed relation is, under its display, and in a word at the end of its
+box.
 
-Displays and boxes that a page types are judged by the letters of the page (`gate.page`, `letters/`).  A relation
-that does not hold, or of which nothing says what it is, is a warning, and warnings are errors.
+Displays and boxes that a page types are judged by the letters of the page (`gate.page`,
+`letters/`).  A relation that does not hold, or of which nothing says what it is, is a warning, and
+warnings are errors.
 """
 
 from __future__ import annotations
@@ -23,13 +25,16 @@ log = logging.getLogger(__name__)
 def say(app, doctree) -> None:
     """Put the words where the reader looks for them."""
     page = Path(app.srcdir, f"{app.env.docname}.md")
-    if page == PAGE or app.env.docname.startswith("manual/"):  # says so itself; is given by a task, for any variant
+    # says so itself; is given by a task, for any variant
+    if page == PAGE or app.env.docname.startswith("manual/"):
         return
     letters = letters_of(page)
     app.env.note_dependency(str(letters_file(page)))
     for display in list(doctree.findall(nodes.math_block)):
         if not _made(display):
-            said = _judged(letters, Formula("display", display.astext(), display.get("label") or ""), display)
+            said = _judged(
+                letters, Formula("display", display.astext(), display.get("label") or ""), display
+            )
             _below(display, mark(said))
     for box in list(doctree.findall(nodes.Admonition)):
         if BOXES & set(box.get("classes", [])):
@@ -61,7 +66,9 @@ def _below(display: nodes.Element, words: str) -> None:
 
 
 def _words(words: str) -> nodes.paragraph:
-    return nodes.paragraph("", words, classes=["kf-verified" if words.startswith("✓") else "kf-said"])
+    return nodes.paragraph(
+        "", words, classes=["kf-verified" if words.startswith("✓") else "kf-said"]
+    )
 
 
 def _counted(said: list[Said]) -> str:

@@ -1,9 +1,9 @@
 """Sphinx extension: docstrings written to be read with `help()`, as reStructuredText for numpydoc.
 
-Characters with a meaning in reStructuredText are escaped.  A paragraph that is indented, or that has
-a relation and ends without a full stop, is an equation and stands as it is, like what follows "::".
-Lines of two columns, parted by two spaces or more, are a table of names, which may go on in lines
-that are indented.  The sections (Parameters, Returns, ...) are numpydoc's.
+Characters with a meaning in reStructuredText are escaped.  A paragraph that is indented, or that
+has a relation and ends without a full stop, is an equation and stands as it is, like what follows
+"::". Lines of two columns, parted by two spaces or more, are a table of names, which may go on in
+lines that are indented.  The sections (Parameters, Returns, ...) are numpydoc's.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ def paragraphs(lines: list[str]) -> list[tuple[str, list[str]]]:
         kind = "prose"
         if before == "sections" or (len(rows) > 1 and set(rows[1].strip()) == {"-"}):
             kind = "sections"
-        elif rows[0].startswith(">>>") or (indented and (before == "verbatim" or last[-1].endswith("::"))):
+        elif rows[0].startswith(">>>") or (
+            indented and (before == "verbatim" or last[-1].endswith("::"))
+        ):
             kind = "verbatim"
         elif indented or (result and rows[-1][-1:] not in ".:?" and RELATION.search(rows[0])):
             kind = "equations"
@@ -68,7 +70,10 @@ def table(rows: list[str]) -> list[str]:
 def escape(row: str) -> str:
     """The row with characters special in reStructuredText escaped; `code` becomes literal."""
     parts = QUOTED.split(row)
-    return "".join("``" + part.strip("`") + "``" if i % 2 else SPECIAL.sub(r"\\\1", part) for i, part in enumerate(parts))
+    return "".join(
+        "``" + part.strip("`") + "``" if i % 2 else SPECIAL.sub(r"\\\1", part)
+        for i, part in enumerate(parts)
+    )
 
 
 def process(app, what, name, obj, options, lines) -> None:
@@ -76,7 +81,8 @@ def process(app, what, name, obj, options, lines) -> None:
 
 
 def skip_tuple_fields(app, what, name, obj, skip, options) -> bool | None:
-    """Fields of a NamedTuple are described in its own docstring ("Alias for field number 0" is no description)."""
+    """Fields of a NamedTuple are described in its own docstring ("Alias for field number 0" is no
+    description)."""
     return True if type(obj).__name__ == "_tuplegetter" else None
 
 

@@ -1,6 +1,7 @@
 """A chapter as a notebook to download: clean, and in Markdown that every Jupyter shows.
 
-The book's Markdown has boxes, references and labels that only the book understands; here they become plain text.
+The book's Markdown has boxes, references and labels that only the book understands; here they
+become plain text.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import re
 import nbformat
 
 BOX = re.compile(
-    r"^(?P<fence>`{3,}|:{3,})\{(?P<kind>[\w:-]+)\}[ \t]*(?P<title>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ \t]*$",
+    r"^(?P<fence>`{3,}|:{3,})\{(?P<kind>[\w:-]+)\}[ "
+    r"\t]*(?P<title>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ \t]*$",
     re.DOTALL | re.MULTILINE,
 )
 OPTION = re.compile(r"^:[\w-]+:.*\n?", re.MULTILINE)

@@ -1,7 +1,8 @@
 """The page of all displayed equations, each with what it is.
 
-`verified` and `typeset` (kfcourse.pages) leave a record beside each equation that they print: LaTeX, how it was verified or
-what it is, its label.  Equations that a chapter types are judged with the letters of the page (gate.page).
+`verified` and `typeset` (kfcourse.pages) leave a record beside each equation that they print:
+LaTeX, how it was verified or what it is, its label.  Equations that a chapter types are judged with
+the letters of the page (gate.page).
 """
 
 from __future__ import annotations
@@ -19,14 +20,16 @@ HEAD = """\
 (all-equations)=
 # All equations
 
-Each equation says what it is. A ✓ stands beside what was verified when the book was built: SymPy has shown that the two sides
-are equal, or numbers have been compared to the digits that are named. Where the text or a box types a relation, its letters
-were given numbers, by the package or by a plain program, and *both sides computed*. If one of these did not hold, there would
-be no book. The others are definitions, quotations, and statements without proof; they stand here letter by letter, and a
-changed letter stops the build, but nothing shows that they are true.
+Each equation says what it is. A ✓ stands beside what was verified when the book was built:
+SymPy has shown that the two sides are equal, or numbers have been compared to the digits that are
+named. Where the text or a box types a relation, its letters were given numbers, by the package or
+by a plain program, and *both sides computed*. If one of these did not hold, there would be no book.
+The others are definitions, quotations, and statements without proof; they stand here letter by
+letter, and a changed letter stops the build, but nothing shows that they are true.
 
-{total} equations in {chapters} chapters were verified by SymPy, {computed} typed relations computed, {others} are said to be
-something else; {claims} statements in words had their conditions evaluated.
+{total} equations in {chapters} chapters were verified by SymPy, {computed} typed
+relations computed, {others} are said to be something else; {claims} statements in words had their
+conditions evaluated.
 """
 
 
@@ -41,24 +44,40 @@ def page(chapters: Iterable[tuple[str, list[dict]]]) -> str:
     parts, counted = [], Counter()
     for document, made in chapters:
         typed = list(judged(PAGE.parent / f"{document}.md"))
-        relations = [one for formula, said in typed if formula.kind in ("display", "box") for one in said]
+        relations = [
+            one for formula, said in typed if formula.kind in ("display", "box") for one in said
+        ]
         here = Counter(
             total=sum(one.get("equations", 0) for one in made),
             claims=sum("sentence" in one for one in made),
             computed=sum(one.computed for one in relations),
-            others=sum(not one.computed for one in relations) + sum("how" in one and not one["equations"] for one in made),
+            others=sum(not one.computed for one in relations)
+            + sum("how" in one and not one["equations"] for one in made),
         )
         counted += here + Counter(chapters=bool(here["total"]))
         shown = [
-            _entry(one["latex"], one["label"], ("✓ " if one["equations"] else "") + one["how"]) for one in made if "how" in one
+            _entry(one["latex"], one["label"], ("✓ " if one["equations"] else "") + one["how"])
+            for one in made
+            if "how" in one
         ]
         shown += [
-            _entry(formula.latex, formula.label, mark(said)) for formula, said in typed if formula.kind == "display" and said
+            _entry(formula.latex, formula.label, mark(said))
+            for formula, said in typed
+            if formula.kind == "display" and said
         ]
         if shown:
-            parts += [f"({place_of(document)})=\n## {_title(document)}\n\n{_count(here)}: {{doc}}`{document}`\n", *shown]
+            parts += [
+                f"({place_of(document)})=\n## {_title(document)}\n\n{_count(here)}: "
+                f"{{doc}}`{document}`\n",
+                *shown,
+            ]
     return (
-        HEAD.format(**{name: counted[name] for name in ("total", "chapters", "computed", "others", "claims")})
+        HEAD.format(
+            **{
+                name: counted[name]
+                for name in ("total", "chapters", "computed", "others", "claims")
+            }
+        )
         + "\n"
         + "\n".join(parts)
     )

@@ -1,6 +1,8 @@
-"""Sphinx extension: executed notebooks in _build/jupyter_execute also when their outputs come from the cache.
+"""Sphinx extension: executed notebooks in _build/jupyter_execute also when their outputs come from
+the cache.
 
-MyST-NB 1.4 writes such a notebook without its outputs there, and nbval would then have nothing to compare.
+MyST-NB 1.4 writes such a notebook without its outputs there, and nbval would then have nothing to
+compare.
 """
 
 from __future__ import annotations

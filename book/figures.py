@@ -21,9 +21,17 @@ def check(app, doctree, name: str) -> None:
         place = next((node for node in (image, *above) if node.line), name)
         figure = next((node for node in above if isinstance(node, nodes.figure)), nodes.figure())
         if not any(isinstance(child, nodes.caption) and child.astext().strip() for child in figure):
-            log.warning("a picture without a caption: %s `figure: {caption: ..., name: fig-...}`", CELL, location=place)
+            log.warning(
+                "a picture without a caption: %s `figure: {caption: ..., name: fig-...}`",
+                CELL,
+                location=place,
+            )
         if not image.get("alt", "").strip():
-            log.warning("a picture without words for those who cannot see it: %s `image: {alt: ...}`", CELL, location=place)
+            log.warning(
+                "a picture without words for those who cannot see it: %s `image: {alt: ...}`",
+                CELL,
+                location=place,
+            )
 
 
 def renumber(app, env) -> None:

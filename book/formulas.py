@@ -1,8 +1,8 @@
 """Sphinx extension: formulas are set when the book is built.
 
-MathJax, run by the Node that playwright brings, writes each formula as the elements and the MathML that it would write in a
-browser; all pages share one style sheet and its fonts.  So a page needs no script to show a formula, no line of it moves, and
-TeX that cannot be read stops the build.
+MathJax, run by the Node that playwright brings, writes each formula as the elements and the MathML
+that it would write in a browser; all pages share one style sheet and its fonts.  So a page needs no
+script to show a formula, no line of it moves, and TeX that cannot be read stops the build.
 """
 
 from __future__ import annotations
@@ -52,12 +52,17 @@ class Setter:
     def _ask(self, what) -> dict[str, str]:
         if self.process is None:
             command = [compute_driver_executable()[0], Path(__file__).with_suffix(".js"), MATHJAX]
-            self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+            )
         self.process.stdin.write(f"{json.dumps(what)}\n")
         self.process.stdin.flush()
         if line := self.process.stdout.readline():
             return json.loads(line)
-        raise RuntimeError(f"Node ended while it set {what!r}, and said why above; `make install` installs what it needs")
+        raise RuntimeError(
+            f"Node ended while it set {what!r}, and said why above; `make install` installs what "
+            f"it needs"
+        )
 
     def close(self) -> None:
         if self.process is not None:
@@ -77,12 +82,17 @@ def _set(node: nodes.Element, tex: str, display: bool) -> str:
 
 
 def in_a_line(writer: HTML5Translator, node: nodes.math) -> None:
-    writer.body += [writer.starttag(node, "span", "", CLASS="math"), _set(node, node.astext(), False), "</span>"]
+    writer.body += [
+        writer.starttag(node, "span", "", CLASS="math"),
+        _set(node, node.astext(), False),
+        "</span>",
+    ]
     raise nodes.SkipNode
 
 
 def displayed(writer: HTML5Translator, node: nodes.math_block) -> None:
-    """With its number; the keyboard reaches it and can scroll it where it is wider than the screen."""
+    """With its number; the keyboard reaches it and can scroll it where it is wider than the
+    screen."""
     number = get_node_equation_number(writer, node) if node["number"] else ""
     writer.body.append(writer.starttag(node, "div", CLASS="math"))
     if number:
@@ -97,10 +107,19 @@ def displayed(writer: HTML5Translator, node: nodes.math_block) -> None:
 
 
 def _lines(tex: str) -> str:
-    """Lines that end with a double backslash, and equations with an empty line between them, stand one below the other."""
-    parts = [rf"\begin{{split}}{part}\end{{split}}" if r"\\" in part else part for part in tex.split("\n\n") if part.strip()]
+    """Lines that end with a double backslash, and equations with an empty line between them, stand
+    one below the other."""
+    parts = [
+        rf"\begin{{split}}{part}\end{{split}}" if r"\\" in part else part
+        for part in tex.split("\n\n")
+        if part.strip()
+    ]
     together = r" \\ ".join(parts)
-    return together if len(parts) == 1 else rf"\begin{{align}}\begin{{aligned}}{together}\end{{aligned}}\end{{align}}"
+    return (
+        together
+        if len(parts) == 1
+        else rf"\begin{{align}}\begin{{aligned}}{together}\end{{aligned}}\end{{align}}"
+    )
 
 
 def write(app, exception: Exception | None) -> None:

@@ -1,4 +1,5 @@
-"""Sphinx extension: the map under the reader's hand on the front page, `{front} name`, from the numbers of readme_figure.py."""
+"""Sphinx extension: the map under the reader's hand on the front page, `{front} name`, from the
+numbers of readme_figure.py."""
 
 from __future__ import annotations
 
@@ -19,7 +20,13 @@ class Front(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         self.env.note_dependency(str(MAP))
-        return [nodes.raw("", who_leads(self.arguments[0], json.loads(MAP.read_text(encoding="utf-8")), FIRST), format="html")]
+        return [
+            nodes.raw(
+                "",
+                who_leads(self.arguments[0], json.loads(MAP.read_text(encoding="utf-8")), FIRST),
+                format="html",
+            )
+        ]
 
 
 def setup(app) -> dict[str, bool]:

@@ -6,8 +6,9 @@
     :exercises: b, g
     ```
 
-prints how long the chapter takes, what it needs, its exercise sets, a link that downloads it as a notebook, and how many
-equations were verified when it was executed: outputs that verify equations say so in their data (equations.py).
+prints how long the chapter takes, what it needs, its exercise sets, a link that downloads it as a
+notebook, and how many equations were verified when it was executed: outputs that verify equations
+say so in their data (equations.py).
 """
 
 from __future__ import annotations
@@ -37,7 +38,11 @@ class chapter_line(nodes.General, nodes.Element):
 
 
 class Chapter(SphinxDirective):
-    option_spec: ClassVar = {"needs": directives.unchanged, "minutes": directives.positive_int, "exercises": directives.unchanged}
+    option_spec: ClassVar = {
+        "needs": directives.unchanged,
+        "minutes": directives.positive_int,
+        "exercises": directives.unchanged,
+    }
 
     def run(self) -> list[nodes.Node]:
         node = chapter_line("", **self.options)
@@ -59,7 +64,13 @@ def print_line(app, doctree, name: str) -> None:
     for line in list(doctree.findall(chapter_line)):
         items = [item for item in _items(app, name, line) if item]
         text = "".join(f"<li>{item}</li>" for item in items)
-        line.replace_self(nodes.raw("", f'<ul class="kf-chapter" aria-label="About this chapter">{text}</ul>', format="html"))
+        line.replace_self(
+            nodes.raw(
+                "",
+                f'<ul class="kf-chapter" aria-label="About this chapter">{text}</ul>',
+                format="html",
+            )
+        )
 
 
 def _items(app, name: str, line: chapter_line):
@@ -72,7 +83,9 @@ def _items(app, name: str, line: chapter_line):
     for letter in letters:
         if letter not in known:
             log.warning("no exercise set %r; there are %s", letter, ", ".join(known), location=line)
-    chosen = [_link(app, name, f"manual/{known[x].name}", line, f"set {x}") for x in letters if x in known]
+    chosen = [
+        _link(app, name, f"manual/{known[x].name}", line, f"set {x}") for x in letters if x in known
+    ]
     yield chosen and f"exercises {', '.join(chosen)}"
     executed = Path(app.outdir).parent / "jupyter_execute" / f"{name}.ipynb"
     if executed.exists():
@@ -80,7 +93,11 @@ def _items(app, name: str, line: chapter_line):
         yield embedded(f"{name}.ipynb", nbformat.writes(plain(notebook)).encode(), "↓ notebook")
         count = sum(one["equations"] for one in records(notebook))
         place = f"{app.builder.get_relative_uri(name, PAGE.stem)}#{place_of(name)}"
-        yield count and f'<a class="kf-count" href="{place}">✓ {count} equation{"s" * (count > 1)} verified</a>'
+        yield (
+            count
+            and f'<a class="kf-count" href="{place}">✓ {count} equation{"s" * (count > 1)} '
+            f"verified</a>"
+        )
 
 
 def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str:
@@ -88,7 +105,8 @@ def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str
     if found is None:
         log.warning("no page %r in _toc.yml", other, location=line)
         return html.escape(other)
-    return f'<a href="{app.builder.get_relative_uri(name, other)}">{html.escape(text or found[1].title)}</a>'
+    address = app.builder.get_relative_uri(name, other)
+    return f'<a href="{address}">{html.escape(text or found[1].title)}</a>'
 
 
 def _words(text: str) -> list[str]:
@@ -96,9 +114,13 @@ def _words(text: str) -> list[str]:
 
 
 def embedded(file: str, content: bytes, text: str) -> str:
-    """A link that downloads what it carries: from a book opened as files a browser would show a linked notebook, not save it."""
+    """A link that downloads what it carries: from a book opened as files a browser would show a
+    linked notebook, not save it."""
     data = base64.b64encode(content).decode()
-    return f'<a download="{html.escape(file)}" href="data:application/x-ipynb+json;base64,{data}">{html.escape(text)}</a>'
+    return (
+        f'<a download="{html.escape(file)}" '
+        f'href="data:application/x-ipynb+json;base64,{data}">{html.escape(text)}</a>'
+    )
 
 
 def embed_downloads(app, doctree, name: str) -> None:
@@ -106,7 +128,9 @@ def embed_downloads(app, doctree, name: str) -> None:
     for link in list(doctree.findall(addnodes.download_reference)):
         path = Path(app.srcdir, name).parent / link["reftarget"]
         if path.suffix == ".ipynb" and path.exists():
-            link.replace_self(nodes.raw("", embedded(path.name, path.read_bytes(), link.astext()), format="html"))
+            link.replace_self(
+                nodes.raw("", embedded(path.name, path.read_bytes(), link.astext()), format="html")
+            )
 
 
 def setup(app) -> dict[str, bool]:

@@ -1,7 +1,7 @@
 """Sphinx extension: what the theme leaves to the book.
 
-The folding side bar with short titles, the line above a title, descriptions for search engines and previews, formulas
-that the keyboard reaches, and a page for addresses that do not exist.
+The folding side bar with short titles, the line above a title, descriptions for search engines and
+previews, formulas that the keyboard reaches, and a page for addresses that do not exist.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from sphinx.writers.html5 import HTML5Translator
 HERE = Path(__file__).resolve().parent
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
 SIZE = re.compile(r"width: (\d+)px;(?: height: (\d+)px;)?")
-LIVE = re.compile(r'<div class="kf-(?:live|explore)" data-name="([^"]+)"')  # a figure that answers, and whose place it takes
+# a figure that answers, and whose place it takes
+LIVE = re.compile(r'<div class="kf-(?:live|explore)" data-name="([^"]+)"')
 
 
 class Captions(SphinxPostTransform):
@@ -33,20 +34,26 @@ class Captions(SphinxPostTransform):
     def run(self, **kwargs) -> None:
         for table in list(self.document.findall(nodes.table)):
             before = table.previous_sibling()
-            if isinstance(before, nodes.paragraph) and before.rawsource.startswith('<span class="kf-caption">'):
+            if isinstance(before, nodes.paragraph) and before.rawsource.startswith(
+                '<span class="kf-caption">'
+            ):
                 before.parent.remove(before)
                 table.insert(0, nodes.title("", "", *before.children[1:-1]))
                 table["classes"].append("kf-table")
 
 
 class InPlace(SphinxPostTransform):
-    """A figure that answers is read right after its still picture: its script runs before what stands below is seen."""
+    """A figure that answers is read right after its still picture: its script runs before what
+    stands below is seen."""
 
-    default_priority = FoldsBelow.default_priority - 1  # cells that are then neighbours have one fold
+    # cells that are then neighbours have one fold
+    default_priority = FoldsBelow.default_priority - 1
     formats = ("html",)
 
     def run(self, **kwargs) -> None:
-        figures = {name: figure for figure in self.document.findall(nodes.figure) for name in figure["ids"]}
+        figures = {
+            name: figure for figure in self.document.findall(nodes.figure) for name in figure["ids"]
+        }
         for live in list(self.document.findall(nodes.raw)):
             if (found := LIVE.search(live.astext())) and found[1] in figures:
                 output = live.parent
@@ -57,10 +64,12 @@ class InPlace(SphinxPostTransform):
 
 
 class Translator(HTML5Translator):
-    """Pages as Sphinx writes them, but for what the keyboard, a screen reader, and the rules of HTML need."""
+    """Pages as Sphinx writes them, but for what the keyboard, a screen reader, and the rules of
+    HTML need."""
 
     def starttag(self, node, tagname, suffix="\n", empty=False, **attributes) -> str:
-        if tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
+        # the room that it will take, and none is loaded before the reader comes near
+        if tagname == "img":
             if size := SIZE.fullmatch(attributes.get("style", "")):
                 attributes |= {"width": size[1], "style": f"--kf-width: {size[1]}px"}
                 attributes |= {"height": size[2]} if size[2] else {}
@@ -69,7 +78,9 @@ class Translator(HTML5Translator):
         return super().starttag(node, tagname, suffix, empty, **attributes)
 
     def visit_title(self, node: nodes.title) -> None:
-        if node is self.document.next_node(nodes.title) and (words := _above(self.builder.env, self.docnames[0])):
+        if node is self.document.next_node(nodes.title) and (
+            words := _above(self.builder.env, self.docnames[0])
+        ):
             self.body.append(f'<p class="kf-part">{html.escape(words)}</p>\n')
         super().visit_title(node)
 
@@ -125,8 +136,13 @@ def use_templates(app, config) -> None:
 
 def complete(app, pagename: str, templatename: str, context: dict, doctree) -> None:
     """Everything a page of the book has besides its text."""
-    context["kf_parts"] = [_part(part, pagename, context["pathto"]) for part in contents.parts(app.env)]
-    context["kf_home"] = {"href": context["pathto"](app.config.root_doc), "current": pagename == app.config.root_doc}
+    context["kf_parts"] = [
+        _part(part, pagename, context["pathto"]) for part in contents.parts(app.env)
+    ]
+    context["kf_home"] = {
+        "href": context["pathto"](app.config.root_doc),
+        "current": pagename == app.config.root_doc,
+    }
     context["kf_unnumbered"] = lambda toc: NUMBER.sub("", toc)
     for step in ("prev", "next"):
         if context.get(step):
@@ -147,14 +163,30 @@ def _above(env, pagename: str) -> str:
 
 
 def _part(part: contents.Part, pagename: str, pathto) -> dict:
-    pages = [{"href": pathto(page.name), "title": page.title, "current": page.name == pagename} for page in part.pages]
-    return {"caption": part.caption, "pages": pages, "current": any(page["current"] for page in pages)}
+    pages = [
+        {"href": pathto(page.name), "title": page.title, "current": page.name == pagename}
+        for page in part.pages
+    ]
+    return {
+        "caption": part.caption,
+        "pages": pages,
+        "current": any(page["current"] for page in pages),
+    }
 
 
 def _described(app, pagename: str, context: dict, doctree) -> str:
     """Title and description of a page for search engines and for previews of links to it."""
-    title = app.env.titles[pagename].astext() if pagename in app.env.titles else app.config.html_title
-    text = next((p.astext() for p in doctree.findall(nodes.paragraph) if len(p.astext()) > 40 and not _boxed(p)), title)
+    title = (
+        app.env.titles[pagename].astext() if pagename in app.env.titles else app.config.html_title
+    )
+    text = next(
+        (
+            p.astext()
+            for p in doctree.findall(nodes.paragraph)
+            if len(p.astext()) > 40 and not _boxed(p)
+        ),
+        title,
+    )
     text = re.sub(r"\s+", " ", text)
     text = text if len(text) <= 200 else text[:197].rsplit(" ", 1)[0] + " ..."
     rows = {
@@ -164,14 +196,17 @@ def _described(app, pagename: str, context: dict, doctree) -> str:
         ("property", "og:type"): "website" if pagename == app.config.root_doc else "article",
         ("property", "og:site_name"): app.config.html_title,
     }
-    return "".join(f'\n  <meta {kind}="{name}" content="{html.escape(value)}" />' for (kind, name), value in rows.items())
+    return "".join(
+        f'\n  <meta {kind}="{name}" content="{html.escape(value)}" />'
+        for (kind, name), value in rows.items()
+    )
 
 
 def _boxed(node: nodes.Node) -> bool:
     while node is not None:
-        if isinstance(node, (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)) or node.get("classes", []) == [
-            "cell"
-        ]:
+        if isinstance(
+            node, (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)
+        ) or node.get("classes", []) == ["cell"]:
             return True
         node = node.parent
     return False
@@ -183,15 +218,19 @@ def write_not_found(app, exception) -> None:
         return
     parts = contents.parts(app.env)
     folders = sorted(
-        {page.name.split("/")[0] for part in parts for page in part.pages if "/" in page.name} | {"_static", "_sources"}
+        {page.name.split("/")[0] for part in parts for page in part.pages if "/" in page.name}
+        | {"_static", "_sources"}
     )
-    page = app.builder.templates.render("404.html", {"title": app.config.html_title, "parts": parts, "folders": folders})
+    page = app.builder.templates.render(
+        "404.html", {"title": app.config.html_title, "parts": parts, "folders": folders}
+    )
     (Path(app.outdir) / "404.html").write_text(page, encoding="utf-8")
 
 
 def leave_scripts_out(app, exception) -> None:
-    """Every icon there is (1.5 MB; _static/icons.css draws the ten that are used), and Bootstrap, which would show the titles of
-    five buttons, as browsers do, and the button to the top (page.js): no page asks for them (_templates/layout.html)."""
+    """Every icon there is (1.5 MB; _static/icons.css draws the ten that are used), and Bootstrap,
+    which would show the titles of five buttons, as browsers do, and the button to the top
+    (page.js): no page asks for them (_templates/layout.html)."""
     if not exception and app.builder.format == "html":
         for name in ("fontawesome.js*", "bootstrap.js*"):
             for path in (Path(app.outdir) / "_static" / "scripts").glob(name):
@@ -205,5 +244,6 @@ def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
     app.connect("build-finished", write_not_found)
     app.connect("build-finished", leave_scripts_out)
-    app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
+    # before the theme, which tries the templates
+    app.connect("html-page-context", complete, priority=300)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,8 +1,8 @@
 """The pages of the lab manual, made from the masters of the exercises for one variant.
 
-Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to reach, and the student's
-notebook to download; and the tables of all sets and variants.  The worked solutions, executed before, are kept in
-_build/solutions.
+Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to
+reach, and the student's notebook to download; and the tables of all sets and variants.  The worked
+solutions, executed before, are kept in _build/solutions.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ SOLUTIONS = Path(__file__).resolve().parent.parent / "_build" / "solutions"
 NOTE = """
 ```{{admonition}} Your own notebook
 The formulas and pictures on this page are those of variant {variant}.
-{{download}}`Download its notebook <notebooks/{file}.ipynb>`, or make that of your own variant, here 5:
-`kfcourse exercises --variant 5 --sets {file[0]} --out mine`. Open it in Jupyter, in an environment in which `kfcourse` is
+{{download}}`Download its notebook <notebooks/{file}.ipynb>`, or make that of your own variant,
+here 5: `kfcourse exercises --variant 5 --sets {file[0]} --out mine`. Open it in Jupyter, in an
+environment in which `kfcourse` is
 installed: {{doc}}`../lab-manual`.
 ```
 """
@@ -44,15 +45,20 @@ def write() -> None:
     (PAGES / "sets.txt").write_text(table(), encoding="utf-8")
     (PAGES / "variants.txt").write_text(variants(), encoding="utf-8")
     for job in solutions():
-        notebook, executed = render(read(job.letter), exercise(job.letter, VARIANT)), nbformat.read(job.target, as_version=4)
+        notebook, executed = (
+            render(read(job.letter), exercise(job.letter, VARIANT)),
+            nbformat.read(job.target, as_version=4),
+        )
         found = pictures(executed)
         for name, png in found.items():
             (PAGES / f"{name}.png").write_bytes(png)
         file = sets()[job.letter].name
-        heading, rest = statement(notebook, {name: (f"{name}.png", shown_width(png)) for name, png in found.items()}).split(
-            "\n", 1
+        heading, rest = statement(
+            notebook, {name: (f"{name}.png", shown_width(png)) for name, png in found.items()}
+        ).split("\n", 1)
+        (PAGES / f"{file}.md").write_text(
+            f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8"
         )
-        (PAGES / f"{file}.md").write_text(f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8")
         nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")
 
 
@@ -64,7 +70,8 @@ def shown_width(png: bytes) -> int:
 def table() -> str:
     """The sets and the chapters that they belong to, in Markdown."""
     rows = [
-        f"| {letter}: {{doc}}`{one.title} <manual/{one.name}>` | {', '.join(f'{{doc}}`{chapter}`' for chapter in one.chapters)} |"
+        f"| {letter}: {{doc}}`{one.title} <manual/{one.name}>` | "
+        f"{', '.join(f'{{doc}}`{chapter}`' for chapter in one.chapters)} |"
         for letter, one in sets().items()
     ]
     return "\n".join(["| set | chapters |", "| --- | --- |", *rows, ""])
@@ -74,6 +81,11 @@ def variants() -> str:
     """The shipped variants without modes, with their equations, in Markdown."""
     rows = []
     for name, one in load_variants().items():
-        state, meter = (", ".join(map(sp.latex, side)) for side in (one.model.state_equation, one.model.meter_equation))
+        state, meter = (
+            ", ".join(map(sp.latex, side))
+            for side in (one.model.state_equation, one.model.meter_equation)
+        )
         rows.append(f"| {name} | ${state}$ | ${meter}$ | {one.title} |")
-    return "\n".join(["| variant | $x_{k+1}=$ | $y_k=$ | what it is |", "| --- | --- | --- | --- |", *rows, ""])
+    return "\n".join(
+        ["| variant | $x_{k+1}=$ | $y_k=$ | what it is |", "| --- | --- | --- | --- |", *rows, ""]
+    )

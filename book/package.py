@@ -57,7 +57,10 @@ def sentence(path: Path) -> str:
 
 def table() -> str:
     """The folders with a sentence each."""
-    about = {name: sentence(PACKAGE.parent.joinpath(*name.split("."), "__init__.py")) for name in folders()}
+    about = {
+        name: sentence(PACKAGE.parent.joinpath(*name.split("."), "__init__.py"))
+        for name in folders()
+    }
     about[PACKAGE.name] = ALONE
     rows = [f"| {{doc}}`{name} <package/{name}>` | {text} |" for name, text in about.items()]
     return "\n".join(["| folder | what lives there |", "| --- | --- |", *rows, ""])

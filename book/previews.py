@@ -1,7 +1,8 @@
 """Sphinx extension: what a link to another page leads to, printed into the page itself.
 
-A page read from a file cannot load another one.  So each page carries, for every equation, figure and term of another page that
-it refers to, what preview.js shows: a formula, a figure as its caption and the address of its picture, a term with its
+A page read from a file cannot load another one.  So each page carries, for every equation, figure
+and term of another page that it refers to, what preview.js shows: a formula, a figure as its
+caption and the address of its picture, a term with its
 sentence.  Only what the page refers to: some hundred bytes each.
 """
 
@@ -34,17 +35,24 @@ def write(app, exception: Exception | None) -> None:
             target = place and posixpath.normpath(posixpath.join(here, place[1]))
             if not target or not (root / target).exists():
                 continue
-            shown = preview(read(target), unquote(place[2]), posixpath.relpath(posixpath.dirname(target) or ".", here))
+            shown = preview(
+                read(target),
+                unquote(place[2]),
+                posixpath.relpath(posixpath.dirname(target) or ".", here),
+            )
             if shown:
                 found[f"{place[1]}#{place[2]}"] = shown
         if found:
-            data = json.dumps(found, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+            data = json.dumps(found, ensure_ascii=False, separators=(",", ":")).replace(
+                "<", "\\u003c"
+            )
             script = f'<script type="application/json" id="kf-previews">{data}</script>\n</body>'
             path.write_text(text.replace("</body>", script), encoding="utf-8")
 
 
 def preview(page: str, identity: str, way: str) -> str:
-    """The figure, formula or term that stands at a place of a page, as HTML; nothing for anything else.
+    """The figure, formula or term that stands at a place of a page, as HTML; nothing for anything
+    else.
 
     `way` leads from the page that shows it to the folder of its own.
     """
@@ -55,7 +63,10 @@ def preview(page: str, identity: str, way: str) -> str:
     target = shown.find()
     if target.name == "dt" and (russian := target.find(class_="kf-ru")):
         meaning = BeautifulSoup(element(page, page.index("<dd", begin)), "html.parser").dd
-        shown = BeautifulSoup(f"<p><b>{target.find(string=True)}</b> {russian}</p>{meaning.decode_contents()}", "html.parser")
+        shown = BeautifulSoup(
+            f"<p><b>{target.find(string=True)}</b> {russian}</p>{meaning.decode_contents()}",
+            "html.parser",
+        )
     elif target.name != "figure" and "math" not in target.get("class", []):
         return ""
     for image in shown.select("[src]"):

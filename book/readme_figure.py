@@ -1,7 +1,8 @@
-"""The picture of the front page and of README.md: the lab's filters of variant 53 above the best possible one (`make figure`).
+"""The picture of the front page and of README.md: the lab's filters of variant 53 above the best
+possible one (`make figure`).
 
-Its text stays text, in the fonts of the page that shows it.  On the screen the front page has a map of other noises too
-(`front.py`), whose numbers are computed here.
+Its text stays text, in the fonts of the page that shows it.  On the screen the front page has a map
+of other noises too (`front.py`), whose numbers are computed here.
 """
 
 from __future__ import annotations
@@ -25,7 +26,13 @@ from kfcourse.pages.figures import label_ends
 from kfcourse.pages.scenes import leading
 
 PICTURE = Path(__file__).with_name("front-figure.svg")
-SHOWN = {"duof": "DUOF", "fos-gaussian": "GFOS", "mfos-linearised": "LMFOS", "aof-linearised": "LAOF", "aof-gaussian": "GAOF"}
+SHOWN = {
+    "duof": "DUOF",
+    "fos-gaussian": "GFOS",
+    "mfos-linearised": "LMFOS",
+    "aof-linearised": "LAOF",
+    "aof-gaussian": "GAOF",
+}
 STEPS = slice(0, 11)
 MAP = Path(__file__).with_name("front-map.json")
 RATIOS = (0.1, 0.2, 0.4, 0.7, 1, 2, 4)  # f/e
@@ -61,9 +68,14 @@ ax.set(xticks=steps, xlabel="step $k$", ylabel="error variance above\nthe exact 
 written = io.StringIO()
 figure.savefig(written, metadata={"Date": None, "Creator": None})
 text = re.sub(
-    r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>|<style.*?</style>", "", written.getvalue(), flags=re.DOTALL
+    r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>|<style.*?</style>",
+    "",
+    written.getvalue(),
+    flags=re.DOTALL,
 ).strip()
-text = re.sub(r'<svg[^>]*?(viewBox="[^"]*")[^>]*>', rf'<svg {NAMESPACES} \1 stroke-linejoin="round">', text)
+text = re.sub(
+    r'<svg[^>]*?(viewBox="[^"]*")[^>]*>', rf'<svg {NAMESPACES} \1 stroke-linejoin="round">', text
+)
 PICTURE.write_text(text + "\n", encoding="utf-8")
 
 e = float(model.parameters["e"])

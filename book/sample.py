@@ -1,4 +1,5 @@
-"""The report of the lab that the book shows, as `kfcourse lab` writes it, and what it prints on the way."""
+"""The report of the lab that the book shows, as `kfcourse lab` writes it, and what it prints on the
+way."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ def write() -> None:
     print("Sample report ...", flush=True)
     shutil.rmtree(FOLDER, ignore_errors=True)
     command = [sys.executable, "-m", "kfcourse", *ARGUMENTS, "--out", str(REPORT)]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    done = subprocess.run(
+        command, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     for path in REPORT.iterdir():
         if path.suffix == ".pdf":
             path.unlink()

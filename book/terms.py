@@ -89,7 +89,9 @@ def fill(app, doctree, name: str) -> None:
 def _letters() -> nodes.paragraph:
     """A link to the first term with each letter."""
     first = {term.name[0].upper(): term.identity for term in reversed(terms())}
-    links = [nodes.reference("", letter, refid=first[letter], internal=True) for letter in sorted(first)]
+    links = [
+        nodes.reference("", letter, refid=first[letter], internal=True) for letter in sorted(first)
+    ]
     return nodes.paragraph("", "", *links, classes=["kf-letters"])
 
 
@@ -123,7 +125,8 @@ def _index() -> nodes.bullet_list:
 
 @cache
 def _looks() -> tuple[re.Pattern, dict[str, Term]]:
-    """A pattern of all uses of terms, the longest first, and whose they are; NIS keeps its capitals."""
+    """A pattern of all uses of terms, the longest first, and whose they are; NIS keeps its
+    capitals."""
     known = {use if use.isupper() else bare(use): term for term in terms() for use in term.uses()}
     uses = sorted(known, key=len, reverse=True)
     either = "|".join(re.escape(use) if use.isupper() else f"(?i:{re.escape(use)})" for use in uses)
@@ -131,7 +134,8 @@ def _looks() -> tuple[re.Pattern, dict[str, Term]]:
 
 
 class FirstUses(SphinxPostTransform):
-    """The first use of a term on a page is a link to the glossary, unless the page introduces the term."""
+    """The first use of a term on a page is a link to the glossary, unless the page introduces the
+    term."""
 
     default_priority = 600
     formats = ("html",)
@@ -173,11 +177,17 @@ class FirstUses(SphinxPostTransform):
 
 
 def _running(text: nodes.Text) -> bool:
-    """In a sentence of the page, not in a heading, a caption, a lead, the objectives, or what a cell prints."""
+    """In a sentence of the page, not in a heading, a caption, a lead, the objectives, or what a
+    cell prints."""
     node, sentence = text.parent, False
     while node is not None:
         classes = node.get("classes", [])
-        if isinstance(node, NOT_LINKED) or {"lead", "objectives", "cell_output", "kf-chapter"} & set(classes):
+        if isinstance(node, NOT_LINKED) or {
+            "lead",
+            "objectives",
+            "cell_output",
+            "kf-chapter",
+        } & set(classes):
             return False
         sentence = sentence or isinstance(node, nodes.paragraph)
         node = node.parent
@@ -188,5 +198,6 @@ def setup(app) -> dict[str, bool]:
     app.add_node(terms_here)
     app.add_directive("terms", Terms)
     app.add_post_transform(FirstUses)
-    app.connect("doctree-resolved", fill, priority=50)  # before the search takes its text (finding.py)
+    # before the search takes its text (finding.py)
+    app.connect("doctree-resolved", fill, priority=50)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

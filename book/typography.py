@@ -20,9 +20,14 @@ class TogetherWithMarks(SphinxPostTransform):
     def run(self, **kwargs) -> None:
         for formula in list(self.document.findall(nodes.math)):
             parent, place = formula.parent, formula.parent.index(formula)
-            opening, closing = _taken(parent, place - 1, OPENING), _taken(parent, place + 1, CLOSING)
+            opening, closing = (
+                _taken(parent, place - 1, OPENING),
+                _taken(parent, place + 1, CLOSING),
+            )
             if opening or closing:
-                parent[place] = nodes.inline("", "", *opening, formula, *closing, classes=["kf-together"])
+                parent[place] = nodes.inline(
+                    "", "", *opening, formula, *closing, classes=["kf-together"]
+                )
 
 
 def _taken(parent: nodes.Element, place: int, marks: re.Pattern[str]) -> list[nodes.Text]:

@@ -1,4 +1,5 @@
-"""What the questions of several sets share: personal numbers, hidden laws, regressions over an ensemble."""
+"""What the questions of several sets share: personal numbers, hidden laws, regressions over an
+ensemble."""
 
 from __future__ import annotations
 
@@ -13,13 +14,19 @@ from kfcourse.laws import Array, transpose
 Map = Callable[[Array], Array]
 
 
-def personal(exercise: Exercise, name: str, **numbers: tuple[float, float, float]) -> dict[str, float]:
-    """Of each number the course's own, for the course's variant, or one of two digits from the range that stands after it.
+def personal(
+    exercise: Exercise, name: str, **numbers: tuple[float, float, float]
+) -> dict[str, float]:
+    """Of each number the course's own, for the course's variant, or one of two digits from the
+    range that stands after it.
 
     It is always the same for a variant and `name`.
     """
     rng, course = exercise.rng(name), exercise.variant.name == COURSE
-    return {key: own if course else float(f"{rng.uniform(low, high):.2g}") for key, (own, low, high) in numbers.items()}
+    return {
+        key: own if course else float(f"{rng.uniform(low, high):.2g}")
+        for key, (own, low, high) in numbers.items()
+    }
 
 
 def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array:
@@ -28,7 +35,8 @@ def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array
     return scale * root @ root.T
 
 
-# -- other functions than the variant's: where it is linear, or has a zero or a one, a mistake would not show
+# -- other functions than the variant's: where it is linear, or has a zero or a one, a mistake would
+# not show
 
 
 def _like(function: Function, changed: Function) -> Function:
@@ -37,15 +45,20 @@ def _like(function: Function, changed: Function) -> Function:
     return changed
 
 
-def other_functions(exercise: Exercise, measure: Function, predict: Function) -> tuple[Function, Function]:
-    """Structural functions with another h, a full G with its F, a curved tau, and a Theta that depends on p.
+def other_functions(
+    exercise: Exercise, measure: Function, predict: Function
+) -> tuple[Function, Function]:
+    """Structural functions with another h, a full G with its F, a curved tau, and a Theta that
+    depends on p.
 
-    What is added has the units of the model: else a component of large numbers makes F singular to rounding, and an answer with
-    an inverse would be wrong by its last digits.
+    What is added has the units of the model: else a component of large numbers makes F singular to
+    rounding, and an answer with an inverse would be wrong by its last digits.
     """
     prior, p = exercise.model.prior, exercise.model.p
     rng, of_state = exercise.rng("other-functions"), np.sqrt(np.diagonal(prior.cov))
-    F = measure(prior.mean[None], prior.cov[None], *([STEP] if vars(measure).get("of_steps") else []))[2]
+    F = measure(
+        prior.mean[None], prior.cov[None], *([STEP] if vars(measure).get("of_steps") else [])
+    )[2]
     of_meter = np.sqrt(np.diagonal(F[0]))
     more = rng.uniform(0.3, 0.6, (p, len(of_state))) * of_meter[:, None] / of_state
     shift = rng.uniform(0.3, 0.6, p) * of_meter
@@ -53,7 +66,11 @@ def other_functions(exercise: Exercise, measure: Function, predict: Function) ->
     def other_measure(m: Array, d: Array, *k: int) -> tuple[Array, Array, Array]:
         h, G, F = measure(m, d, *k)
         full_G = G + more
-        return h + (m - prior.mean) @ more.T + shift, full_G, 1.1 * (F - G @ d @ transpose(G)) + full_G @ d @ transpose(full_G)
+        return (
+            h + (m - prior.mean) @ more.T + shift,
+            full_G,
+            1.1 * (F - G @ d @ transpose(G)) + full_G @ d @ transpose(full_G),
+        )
 
     def other_predict(z: Array, p: Array, *k: int) -> tuple[Array, Array]:
         tau, Theta = predict(z, p, *k)
@@ -77,7 +94,9 @@ def other_equations(exercise: Exercise, a: Function, b: Function) -> tuple[Funct
 
 # -- regressions over an ensemble
 
-RUNS = 60  # hidden trajectories: a regression over so few differs clearly from one with N - 1 in the place of N
+# hidden trajectories: a regression over so few differs clearly from one with N - 1 in the place of
+# N
+RUNS = 60
 
 
 def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
@@ -98,7 +117,8 @@ OFFSET = "target.mean(axis=0) - matrix @ regressor.mean(axis=0)", "target.mean(a
 
 
 def ensemble(exercise: Exercise, name: str) -> tuple[Array, Array, Array]:
-    """x_k, y_k and x_{k+1} of hidden trajectories, (N, ...), at a step when the filter is under way."""
+    """x_k, y_k and x_{k+1} of hidden trajectories, (N, ...), at a step when the filter is under
+    way."""
     x, y = exercise.simulate(RUNS, 4, name)
     return x[2], y[2], x[3]
 

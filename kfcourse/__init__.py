@@ -4,9 +4,10 @@ model = Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f
 gaussian(model).latex()                            structural functions, derived
 compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 
-A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal laws, gain with its
-pseudo-inverse, correction, missing measurements), `angles` (the short way round), `limits` (a time limit for a block of
-code), `errors` (exceptions that a report can reword, checks of arguments), `files`
+A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal
+laws, gain with its pseudo-inverse, correction, missing measurements), `angles` (the short way
+round), `limits` (a time limit for a block of code), `errors` (exceptions that a report can reword,
+checks of arguments), `files`
 (whole or not at all).
 """
 

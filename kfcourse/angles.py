@@ -1,7 +1,8 @@
 """Angles: 359 degrees and 1 degree are neighbours, and so are pi - 0.01 and -pi + 0.01.
 
-A component that is an angle, in radians, is kept between -pi and pi.  A difference of two angles is the short way round.
-Components are named by their numbers: `which` is (1,) if the second one is an angle, () if none is, which costs nothing.
+A component that is an angle, in radians, is kept between -pi and pi.  A difference of two angles is
+the short way round. Components are named by their numbers: `which` is (1,) if the second one is an
+angle, () if none is, which costs nothing.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ def on_circle(vector: Array, which: Components) -> Array:
     """A vector (..., n) with its angles between -pi and pi."""
     if not which:
         return vector
-    result = np.array(vector, dtype=np.result_type(vector, 0.0))  # whole numbers would cut the angles off
+    # whole numbers would cut the angles off
+    result = np.array(vector, dtype=np.result_type(vector, 0.0))
     for i in which:  # views: of few trajectories in half the time of picking columns
         result[..., i] = wrapped(result[..., i])
     return result
@@ -45,14 +47,16 @@ def difference(left: Array, right: Array, which: Components) -> Array:
 
 
 def near(vector: Array, reference: Array, which: Components) -> Array:
-    """The vector (..., n) with whole turns added to its angles, so that they lie within half a turn of the reference's."""
+    """The vector (..., n) with whole turns added to its angles, so that they lie within half a turn
+    of the reference's."""
     if not which:
         return vector
     return reference + difference(vector, reference, which)
 
 
 def moments_on_circle(angle: Array, mass: Array) -> tuple[Array, Array]:
-    """Mean and variance of masses, in all 1, at angles: (..., M), (..., M) -> (...), (...), as seen from their circular mean.
+    """Mean and variance of masses, in all 1, at angles: (..., M), (..., M) -> (...), (...), as seen
+    from their circular mean.
 
     c = arg sum_j m_j exp(i x_j),   `mean` = c + sum_j m_j `wrapped`(x_j - c)
     """

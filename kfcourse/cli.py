@@ -45,13 +45,19 @@ from kfcourse.montecarlo.parallel import cores
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
-DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
+# seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
+DERIVATION = 180.0
 INSTRUCTORS = ("exercises", "grade", "solutions")
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 RUNS = 20_000  # trajectories
 
 
-VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
+VARIANTS = click.option(
+    "--variants",
+    "variants_file",
+    type=click.Path(path_type=Path),
+    help="Another TOML file of variants.",
+)
 
 
 @contextmanager
@@ -59,13 +65,16 @@ def _clear_errors() -> Iterator[None]:
     """What went wrong is said in a sentence, not in a traceback."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's: what became infinite is reported by name
+            # NumPy's: what became infinite is reported by name
+            warnings.simplefilter("ignore", RuntimeWarning)
             warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
             yield
     except (ValueError, NotFinite) as error:
         raise click.ClickException(str(error)) from None
     except MemoryError:
-        raise click.ClickException("this needs more memory than there is; take fewer --runs, --steps or --jobs") from None
+        raise click.ClickException(
+            "this needs more memory than there is; take fewer --runs, --steps or --jobs"
+        ) from None
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -78,14 +87,19 @@ def _clear_errors() -> Iterator[None]:
 
 
 class _Group(click.Group):
-    """Commands that say in a sentence what a user did wrong; the instructor's are imported when they are asked for."""
+    """Commands that say in a sentence what a user did wrong; the instructor's are imported when
+    they are asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted([*self.commands, *INSTRUCTORS])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         instructors = name in INSTRUCTORS
-        return getattr(import_module("kfcourse.notebooks.commands"), name) if instructors else self.commands.get(name)
+        return (
+            getattr(import_module("kfcourse.notebooks.commands"), name)
+            if instructors
+            else self.commands.get(name)
+        )
 
     def invoke(self, ctx: click.Context) -> object:
         with _clear_errors():
@@ -94,7 +108,9 @@ class _Group(click.Group):
             except click.UsageError as error:
                 if "unexpected extra argument" not in error.message:
                     raise
-                hint = "separate names by commas (--sets a,b), and repeat --variant for each variant"
+                hint = (
+                    "separate names by commas (--sets a,b), and repeat --variant for each variant"
+                )
                 raise click.UsageError(f"{error.message}: {hint}", error.ctx) from None
 
 
@@ -115,21 +131,36 @@ def main() -> None:
     help="Trajectories, the same for all filters.",
 )
 @click.option(
-    "--steps", type=click.IntRange(min=1), help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]"
+    "--steps",
+    type=click.IntRange(min=1),
+    help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed gives the same numbers.")
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=1,
+    show_default=True,
+    help="The same seed gives the same numbers.",
+)
 @click.option(
     "--filters",
     "names",
-    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}; for variants with modes: {', '.join(JUMP_FILTERS)}.  "
-    "[default: the lab's seven and the exact AOF; for variants with modes all but those that remember several steps]",
+    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}; for variants with "
+    f"modes: {', '.join(JUMP_FILTERS)}.  "
+    "[default: the lab's seven and the exact AOF; for variants with modes all but those that "
+    "remember several steps]",
 )
 @click.option(
     "--bound",
     is_flag=True,
-    help="Bound vector models, too: the exact AOF by particles, which takes minutes for some thousand trajectories.",
+    help="Bound vector models, too: the exact AOF by particles, which takes minutes for some "
+    "thousand trajectories.",
 )
-@click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
+@click.option(
+    "--same-ensemble",
+    is_flag=True,
+    help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.",
+)
 @click.option(
     "--jobs",
     "--threads",
@@ -138,12 +169,22 @@ def main() -> None:
     help="Processor cores to use; does not change the numbers.  [default: all]",
 )
 @click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
-    "--report", "language", type=click.Choice(LANGUAGES), default="en", show_default=True, help="Language of the report."
+    "--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]"
 )
 @click.option(
-    "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
+    "--report",
+    "language",
+    type=click.Choice(LANGUAGES),
+    default="en",
+    show_default=True,
+    help="Language of the report.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path),
+    help="Also write the numbers to this file; - is standard output.",
 )
 def lab(
     variant: str,
@@ -162,8 +203,8 @@ def lab(
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
 
-    The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra (BLAS) may round
-    otherwise, by 1e-13 or so.
+    The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra
+    (BLAS) may round otherwise, by 1e-13 or so.
     """
     chosen = find_variant(variant, variants_file)
     model = chosen.model
@@ -172,7 +213,11 @@ def lab(
         bound = bound or has_exact(model)
         wanted = [*usual, EXACT] if bound else list(usual)
         if not bound:
-            click.echo("No bound: point masses do not reach this model; --bound runs particles beside the others", err=True)
+            click.echo(
+                "No bound: point masses do not reach this model; --bound runs particles beside "
+                "the others",
+                err=True,
+            )
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
     found = admissions(model, wanted, DERIVATION)
@@ -181,7 +226,9 @@ def lab(
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
     entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
-    of_functions = [one for one in found if entries[one.name].functions in ("gaussian", "best", "averaged")]
+    of_functions = [
+        one for one in found if entries[one.name].functions in ("gaussian", "best", "averaged")
+    ]
     for remark in dict.fromkeys(remark for one in of_functions for remark in one.remarks):
         whose = ", ".join(title(one.name) for one in of_functions if remark in one.remarks)
         click.echo(f"{whose}: {remark}", err=True)
@@ -212,17 +259,27 @@ def lab(
     if json_file:
         write_json(chosen, result, json_file)
     if getattr(model, "between", None) is not None:
-        click.echo("No report: its derivation begins with a difference equation, which this model has not", err=True)
+        click.echo(
+            "No report: its derivation begins with a difference equation, which this model has not",
+            err=True,
+        )
         return
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
-        write_report(chosen, result, place, language, admissions(model, None, DERIVATION, found), modes)
-    click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
+        write_report(
+            chosen, result, place, language, admissions(model, None, DERIVATION, found), modes
+        )
+    click.echo(
+        f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""),
+        err=to_error,
+    )
 
 
 def _tell(result: Comparison, to_error: bool) -> None:
     """The ranking; to standard error if standard output takes the numbers."""
-    lines = [f"D_k above that of {title(result.reference)}, %, mean over the steps ± standard error:"]
+    lines = [
+        f"D_k above that of {title(result.reference)}, %, mean over the steps ± standard error:"
+    ]
     for name, gap in result.ranking():
         found = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else found}")
@@ -239,7 +296,8 @@ def _kept(folder: Path) -> Iterator[None]:
     except Exception as error:
         reason = " ".join(str(error).split())[:200] or "no reason given"
         raise click.ClickException(
-            f"no report was written to {folder} ({type(error).__name__}: {reason}); what was there is there, the ranking holds"
+            f"no report was written to {folder} ({type(error).__name__}: {reason}); what was "
+            f"there is there, the ranking holds"
         ) from None
 
 
@@ -259,9 +317,24 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
 @main.command()
 @VARIANTS
 @click.option("--variant", "names", multiple=True, help="Only this one; may be repeated.")
-@click.option("--check", is_flag=True, help="Say of each whether it is well posed; exit status 1 if one is not.")
-@click.option("--generate", "wanted", type=click.IntRange(1, 200), help="Propose so many new variants that are well posed.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the trajectories and proposals.")
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Say of each whether it is well posed; exit status 1 if one is not.",
+)
+@click.option(
+    "--generate",
+    "wanted",
+    type=click.IntRange(1, 200),
+    help="Propose so many new variants that are well posed.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=1,
+    show_default=True,
+    help="Of the trajectories and proposals.",
+)
 @click.option(
     "--runs",
     type=click.IntRange(min=FEWEST),
@@ -269,9 +342,15 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
     show_default=True,
     help="Trajectories of a check, an eighth for vectors.",
 )
-@click.option("--jobs", type=click.IntRange(min=1), help="Does not change the results.  [default: all cores]")
+@click.option(
+    "--jobs", type=click.IntRange(min=1), help="Does not change the results.  [default: all cores]"
+)
 @click.option("--dask", help="Address of a Dask scheduler whose workers check instead.")
-@click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="New file for the proposed variants.  [default: print them]",
+)
 def variants(
     variants_file: Path | None,
     names: tuple[str, ...],
@@ -301,7 +380,9 @@ def variants(
     chosen, faults = read_variants(variants_file, names)
     good = not faults
     if check and chosen:
-        found = list(quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed, dask))
+        found = list(
+            quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed, dask)
+        )
         click.echo(quality.table(found))
         good &= all(one.well_posed for one in found)
     else:
@@ -315,29 +396,42 @@ def variants(
 def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:
     """Proposed variants to the file or to standard output, what was rejected to standard error."""
     if out and (os.path.lexists(out) or not out.parent.is_dir()):
-        raise click.ClickException(f"the variants cannot go to {out}: name a new file in an existing folder with --out")
+        raise click.ClickException(
+            f"the variants cannot go to {out}: name a new file in an existing folder with --out"
+        )
     found = grammar.generate(wanted, seed, runs, jobs, unposed)
     reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
-    click.echo(f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True)
+    click.echo(
+        f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True
+    )
     if found.variants:
-        text = f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs {runs}\n\n{found.toml()}"
+        text = (
+            f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs "
+            f"{runs}\n\n{found.toml()}"
+        )
         if out:
             save(text, out)
         else:
             click.echo(text, nl=False)
     if len(found.variants) < wanted:
-        raise click.ClickException(f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try another --seed")
+        raise click.ClickException(
+            f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try "
+            f"another --seed"
+        )
 
 
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @VARIANTS
-@click.option("--variant", help="Of which the derivation is; a heading of the file may name it as well.")
+@click.option(
+    "--variant", help="Of which the derivation is; a heading of the file may name it as well."
+)
 def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
-    """Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and = g^2*d.
+    """Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and =
+    g^2*d.
 
-    Each line is compared with the one above it, and the term that is wrong is named.  Exit status 0 if all lines are right, 1
-    if one differs, 2 if one, or the file, cannot be read or compared.
+    Each line is compared with the one above it, and the term that is wrong is named.  Exit status 0
+    if all lines are right, 1 if one differs, 2 if one, or the file, cannot be read or compared.
     """
 
     def model(name: str) -> Model:
@@ -347,8 +441,12 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
         with file.open("rb") as stream:
             content = stream.read(LONGEST + 1)
         if len(content) > LONGEST:
-            raise ValueError(f"{file} has more than {LONGEST:,} bytes: it is no derivation; check the path")
-        report = check_text(content.decode("utf-8-sig"), model, of_model(model(variant)) if variant else None)
+            raise ValueError(
+                f"{file} has more than {LONGEST:,} bytes: it is no derivation; check the path"
+            )
+        report = check_text(
+            content.decode("utf-8-sig"), model, of_model(model(variant)) if variant else None
+        )
     except UnicodeDecodeError:
         fault = f"{file} is no text in UTF-8: save it as such"
     except OSError as error:
@@ -356,7 +454,11 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     except ValueError as error:
         fault = str(error)
     else:
-        fault = "" if report.chains else f"{file} has no chain of lines, such as F = M[(g*x - h)^2] and, below it, = g^2*d"
+        fault = (
+            ""
+            if report.chains
+            else f"{file} has no chain of lines, such as F = M[(g*x - h)^2] and, below it, = g^2*d"
+        )
     if fault:
         click.echo(f"Error: {fault}", err=True)
         sys.exit(2)
@@ -366,14 +468,21 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
 
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--model", "model_file", type=click.Path(path_type=Path), required=True, help="TOML file with the model.")
+@click.option(
+    "--model",
+    "model_file",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="TOML file with the model.",
+)
 @click.option("--variant", "name", help="Its name in the file, if there are several.")
 @click.option(
     "--column",
     "pairs",
     multiple=True,
     metavar="NAME=COLUMN",
-    help="The model's name and the column's, where they differ, such as y1=east or time=time_s; may be repeated.",
+    help="The model's name and the column's, where they differ, such as y1=east or time=time_s; "
+    "may be repeated.",
 )
 @click.option(
     "--filter",
@@ -387,13 +496,32 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     "--gate",
     type=click.FloatRange(0, 1, min_open=True, max_open=True),
     metavar="PROBABILITY",
-    help="Refuse measurements that a right filter would not see with this probability, such as 0.999.",
+    help="Refuse measurements that a right filter would not see with this probability, such as "
+    "0.999.",
 )
-@click.option("--by-component", is_flag=True, help="Let the gate judge each component of a row, y1, y2, ..., for itself.")
-@click.option("--unknown", default="", metavar="NAMES", help="Parameters to find by likelihood first, separated by commas.")
-@click.option("--positive", default="", metavar="NAMES", help="Those of them that are positive, such as variances.")
-@click.option("--track", metavar="X,Y", help="Two components of the state, drawn against each other.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: estimate-FILE]")
+@click.option(
+    "--by-component",
+    is_flag=True,
+    help="Let the gate judge each component of a row, y1, y2, ..., for itself.",
+)
+@click.option(
+    "--unknown",
+    default="",
+    metavar="NAMES",
+    help="Parameters to find by likelihood first, separated by commas.",
+)
+@click.option(
+    "--positive",
+    default="",
+    metavar="NAMES",
+    help="Those of them that are positive, such as variances.",
+)
+@click.option(
+    "--track", metavar="X,Y", help="Two components of the state, drawn against each other."
+)
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: estimate-FILE]"
+)
 def estimate(
     file: Path,
     model_file: Path,
@@ -407,10 +535,12 @@ def estimate(
     track: str | None,
     out: Path | None,
 ) -> None:
-    """Estimate the states from your own measurements, FILE (CSV): forward, looking back, and judged.
+    """Estimate the states from your own measurements, FILE (CSV): forward, looking back, and
+    judged.
 
-    A row is a step; its cells are found by the names in the first line: y (or y1, y2, ...), time, and the inputs.  An empty cell
-    is a missing measurement.  The model may use dt, the interval to the next row, with inputs = { dt = [1] }, as in this file:
+    A row is a step; its cells are found by the names in the first line: y (or y1, y2, ...), time,
+    and the inputs.  An empty cell is a missing measurement.  The model may use dt, the interval to
+    the next row, with inputs = { dt = [1] }, as in this file:
 
     \b
     [variants.walk]
@@ -425,7 +555,9 @@ def estimate(
     drawn = _pair(track, [symbol.name for symbol in variant.model.x]) if track else None
     columns = dict(pair.partition("=")[::2] for pair in pairs)
     if not all(columns.values()):
-        raise click.UsageError("--column takes a name of the model and one of the file, such as --column y1=east")
+        raise click.UsageError(
+            "--column takes a name of the model and one of the file, such as --column y1=east"
+        )
     _check_places(folder, None)  # before the long part
     click.echo(f"Model {variant.name}: {variant.title or variant.model}", err=True)
     told = estimate_record(
@@ -445,7 +577,10 @@ def _names(text: str) -> list[str]:
 def _pair(text: str, known: list[str]) -> tuple[str, str]:
     names = _names(text)
     if len(names) != 2 or not set(names) <= set(known):
-        raise click.UsageError(f"--track takes two components of the state, separated by a comma; there are {', '.join(known)}")
+        raise click.UsageError(
+            f"--track takes two components of the state, separated by a comma; there are "
+            f"{', '.join(known)}"
+        )
     return names[0], names[1]
 
 
@@ -454,9 +589,12 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not (there.is_dir() and os.access(there, os.W_OK)):
         raise click.ClickException(
-            f"the report cannot go to {folder}: {there} is no folder to write to; choose another one with --out"
+            f"the report cannot go to {folder}: {there} is no folder to write to; choose another "
+            f"one with --out"
         )
     if str(json_file) in STANDARD_OUTPUT or json_file is None:
         return
     if json_file.is_dir() or not json_file.parent.is_dir():
-        raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
+        raise click.ClickException(
+            f"the numbers cannot go to {json_file}: name a file in an existing folder with --json"
+        )

@@ -1,4 +1,5 @@
-"""What is refused, and in which words: exceptions that a report can reword, and checks of an argument's kind and size."""
+"""What is refused, and in which words: exceptions that a report can reword, and checks of an
+argument's kind and size."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ Reason: TypeAlias = str | Exception  # why something is left out: the error, or 
 
 REMEDIES = {
     "Model": "give a model, such as Model.define(...) or the .model of a filter",
-    "Structure": "give linearised(model), gaussian(model), unscented(model) or gauss_hermite(model)",
+    "Structure": "give linearised(model), gaussian(model), unscented(model) or "
+    "gauss_hermite(model)",
     "Filter": "give a filter, such as aof(linearised(model)); design(...) makes one of a design",
 }
 
@@ -59,13 +61,16 @@ REMEDIES = {
 def expect(given: object, kind: type, what: str, *also: type) -> None:
     """TypeError unless an argument of `what` is of this kind, or one of the others."""
     if not isinstance(given, (kind, *also)):
-        came = f"{type(given).__name__} {getattr(given, 'name', getattr(given, '__name__', ''))}".rstrip()
+        came = (
+            f"{type(given).__name__} {getattr(given, 'name', getattr(given, '__name__', ''))}"
+        ).rstrip()
         remedy = REMEDIES.get(kind.__name__, "see its documentation")
         raise TypeError(f"{what} expects a {kind.__name__}, got {came}: {remedy}")
 
 
 def expect_sizes(**sizes: object) -> None:
-    """ValueError for one of these numbers, of steps, runs and so on, that is not a positive whole one."""
+    """ValueError for one of these numbers, of steps, runs and so on, that is not a positive whole
+    one."""
     for name, value in sizes.items():
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
             raise ValueError(f"{name} must be a positive whole number, got {value!r}")

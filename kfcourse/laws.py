@@ -1,4 +1,5 @@
-"""Normal laws, their correction by a measurement, and the little linear algebra that every filter shares.
+"""Normal laws, their correction by a measurement, and the little linear algebra that every filter
+shares.
 
 Shapes: vectors are (..., n), matrices (..., r, c); the leading axes run over the ensemble, and an
 array without them is the same for every trajectory.  Scalar models keep their axes of length 1;
@@ -38,8 +39,9 @@ class Measurement(NamedTuple):
 
     h (..., p), G (..., p, n), F (..., p, p): mean of y, its sensitivity dh/dm, covariance of y.
 
-    R = F - G d G^T, (..., p, p), is the part of F that the state does not explain.  It is derived, not
-    subtracted: where the meter is far sharper than the prediction the difference would be rounding.
+    R = F - G d G^T, (..., p, p), is the part of F that the state does not explain.  It is derived,
+    not subtracted: where the meter is far sharper than the prediction the difference would be
+    rounding.
     """
 
     h: Vectors
@@ -53,10 +55,12 @@ class Measurement(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """What looking back must know of the object beside tau and Theta: its structural functions at N(z, p), like G and R.
+    """What looking back must know of the object beside tau and Theta: its structural functions at
+    N(z, p), like G and R.
 
-    A (..., n, n), Q (..., n, n): the sensitivity dtau/dz of the next state's mean, and Q = Theta - A p A^T, the part of its
-    covariance that this state does not explain.  Q is derived, not subtracted, as R is.
+    A (..., n, n), Q (..., n, n): the sensitivity dtau/dz of the next state's mean, and Q = Theta -
+    A p A^T, the part of its covariance that this state does not explain.  Q is derived, not
+    subtracted, as R is.
     """
 
     A: Matrices
@@ -82,7 +86,8 @@ def apply(matrix: Matrices, vector: Vectors) -> Vectors:
     """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
     if matrix.shape[-2:] == (1, 1):
         return matrix[..., 0] * vector
-    return np.einsum("...ij,...j", matrix, vector)  # of many small matrices twice as fast as their products
+    # of many small matrices twice as fast as their products
+    return np.einsum("...ij,...j", matrix, vector)
 
 
 def product(left: Matrices, right: Matrices) -> Matrices:
@@ -93,7 +98,8 @@ def product(left: Matrices, right: Matrices) -> Matrices:
 
 
 def transpose(matrix: Matrices) -> Matrices:
-    """The transpose of the last two axes, row by row in memory: products of many small matrices are then twice as fast."""
+    """The transpose of the last two axes, row by row in memory: products of many small matrices are
+    then twice as fast."""
     return matrix if matrix.shape[-2:] == (1, 1) else np.ascontiguousarray(matrix.swapaxes(-1, -2))
 
 
@@ -110,13 +116,14 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
     cross : (..., n, p)
         Cov(x, y).
     cov : (..., p, p)
-        Cov(y), symmetric and non-negative; where it is singular the pseudo-inverse takes the place of
-        the inverse, so a measurement that cannot vary gets the gain 0.  Where it is NaN the gain is NaN.
-        How small a variance may be depends on its units, which are free: 1e-32 is a good variance.  A variance that is only
-        rounding must therefore be made 0 where it arises.
+        Cov(y), symmetric and non-negative; where it is singular the pseudo-inverse takes the place
+        of the inverse, so a measurement that cannot vary gets the gain 0.  Where it is NaN the gain
+        is NaN. How small a variance may be depends on its units, which are free: 1e-32 is a good
+        variance.  A variance that is only rounding must therefore be made 0 where it arises.
     broken : bool
-        Whether `cov` comes from a filter whose covariance rounding may have broken.  A negative variance is then divided by
-        like any other: P^-1 + H^T R^-1 H holds for every P, so each measurement still adds its information, and the filter
+        Whether `cov` comes from a filter whose covariance rounding may have broken.  A negative
+        variance is then divided by like any other: P^-1 + H^T R^-1 H holds for every P, so each
+        measurement still adds its information, and the filter
         finds back.  A gain of 0 there would stop the corrections for good.
 
     Raises
@@ -129,7 +136,9 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
             return cross / cov
         if not broken:
             _refuse_negative(cov, 0.0)
-        zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
+        zero = np.zeros(
+            np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov)
+        )
         return np.divide(cross, cov, out=zero, where=cov != 0)
     singular = rounding(cov.dtype)
     # Scaling to correlations first: components may differ by orders of magnitude in size.
@@ -140,7 +149,10 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
     scaled_cross = cross / scale[..., None, :]
     try:
         if np.diagonal(np.linalg.cholesky(correlation), axis1=-2, axis2=-1).min() > singular:
-            return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]
+            return (
+                transpose(np.linalg.solve(correlation, transpose(scaled_cross)))
+                / scale[..., None, :]
+            )
     except np.linalg.LinAlgError:
         pass
     if not broken:
@@ -150,7 +162,8 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
     return np.where(unknown, np.nan, scaled_cross @ inverse / scale[..., None, :])
 
 
-# A Cholesky pivot of a correlation matrix below this is rounding, in units of the root of the precision (1.5e-8 in float64).
+# A Cholesky pivot of a correlation matrix below this is rounding, in units of the root of the
+# precision (1.5e-8 in float64).
 SINGULAR = 7.0
 
 
@@ -174,7 +187,8 @@ def correct(prior: Gaussian, measurement: Measurement, y: Vectors) -> Gaussian:
 
     K = Psi G^T F^+,   z = lambda + K (y - h),   p = Psi - K G Psi
 
-    K and p as of `regression`.  A trajectory with a missing measurement (NaN) keeps its prior for the missing components.
+    K and p as of `regression`.  A trajectory with a missing measurement (NaN) keeps its prior for
+    the missing components.
     """
     innovation, (_, G, F, R) = measurement.innovation(y), measurement
     if any_missing(innovation):
@@ -184,24 +198,31 @@ def correct(prior: Gaussian, measurement: Measurement, y: Vectors) -> Gaussian:
 
 
 def regression(cov: Matrices, G: Matrices, F: Matrices, R: Matrices) -> tuple[Matrices, Matrices]:
-    """The regression of a state with this covariance on y = G x + e, Cov(y) = F, Cov(e) = R: its gain, and what y leaves of cov.
+    """The regression of a state with this covariance on y = G x + e, Cov(y) = F, Cov(e) = R: its
+    gain, and what y leaves of cov.
 
     K = `cov` G^T F^+,   `cov` - K G `cov`
 
-    The last is evaluated as (I - K G) cov (I - K G)^T + K R K^T (Joseph's form, with R = F - G cov G^T), for
-    scalars as cov R / F: equal, but never negative.  Where rounding has broken the covariance F may be negative, and is divided
-    by (see `gain`); of one state and one measurement it is negative only if a rule of quadrature made it so, and tells nothing.
+    The last is evaluated as (I - K G) cov (I - K G)^T + K R K^T (Joseph's form, with R = F - G cov
+    G^T), for scalars as cov R / F: equal, but never negative.  Where rounding has broken the
+    covariance F may be negative, and is divided by (see `gain`); of one state and one measurement
+    it is negative only if a rule of quadrature made it so, and tells nothing.
     """
     if G.shape[-2:] == (1, 1):
         varies = np.minimum.reduce(F, axis=None) > 0
         share = cov / F if varies else gain(cov, np.maximum(F, 0.0))
-        return share * G, share * R if varies else np.where(F <= 0, cov, share * R)  # what cannot vary tells nothing
+        # what cannot vary tells nothing
+        return share * G, share * R if varies else np.where(F <= 0, cov, share * R)
     K = gain(product(cov, transpose(G)), F, broken=True)
     rest = np.eye(cov.shape[-1], dtype=cov.dtype) - product(K, G)
-    return K, symmetric(product(product(rest, cov), transpose(rest)) + product(product(K, R), transpose(K)))
+    return K, symmetric(
+        product(product(rest, cov), transpose(rest)) + product(product(K, R), transpose(K))
+    )
 
 
-def without_missing(innovation: Vectors, G: Matrices, F: Matrices, R: Matrices) -> tuple[Vectors, Matrices, Matrices, Matrices]:
+def without_missing(
+    innovation: Vectors, G: Matrices, F: Matrices, R: Matrices
+) -> tuple[Vectors, Matrices, Matrices, Matrices]:
     """Take missing components out: no innovation, no sensitivity, a variance of their own."""
     missing = np.isnan(innovation)
     either = missing[..., :, None] | missing[..., None, :]
@@ -215,7 +236,8 @@ def without_missing(innovation: Vectors, G: Matrices, F: Matrices, R: Matrices) 
 
 
 def any_missing(y: Array) -> bool:
-    """Whether any entry is NaN: the minimum is then NaN too, and is the fastest pass over an array."""
+    """Whether any entry is NaN: the minimum is then NaN too, and is the fastest pass over an
+    array."""
     return bool(np.isnan(np.minimum.reduce(y, axis=None)))
 
 
@@ -241,7 +263,8 @@ def normalised_square(vector: Vectors, cov: Matrices) -> Array:
 
 
 def log_density(measurement: Measurement, y: Vectors) -> Array:
-    """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter; inf where F is singular.
+    """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter;
+    inf where F is singular.
 
     -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h
     """
@@ -250,7 +273,9 @@ def log_density(measurement: Measurement, y: Vectors) -> Array:
     if any_missing(innovation):
         present = (~np.isnan(innovation)).sum(axis=-1)
         innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
-    return -0.5 * (normalised_square(innovation, F) + _log_determinant(F) + present * np.log(2 * np.pi))
+    return -0.5 * (
+        normalised_square(innovation, F) + _log_determinant(F) + present * np.log(2 * np.pi)
+    )
 
 
 def _log_determinant(cov: Matrices) -> Array:

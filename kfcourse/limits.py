@@ -13,7 +13,8 @@ import threading
 import time
 from types import FrameType
 
-AGAIN = 0.01  # seconds after which a loop that survived its end, by `except BaseException`, is stopped again
+# seconds after which a loop that survived its end, by `except BaseException`, is stopped again
+AGAIN = 0.01
 FILE = 100 * 2**20  # bytes that a limited process may write to one file
 PROCESSES = 4096  # of the user's, threads included
 
@@ -40,7 +41,8 @@ class time_limit:
     """
 
     def __init__(self, seconds: float):
-        self.seconds = min(seconds, threading.TIMEOUT_MAX)  # centuries; infinity is no time for a clock
+        # centuries; infinity is no time for a clock
+        self.seconds = min(seconds, threading.TIMEOUT_MAX)
 
     def __enter__(self) -> None:
         main = threading.current_thread() is threading.main_thread()

@@ -1,4 +1,5 @@
-"""Figures that answer, for tests: each figure of the book on a page of its own, and what is done with it."""
+"""Figures that answer, for tests: each figure of the book on a page of its own, and what is done
+with it."""
 
 from __future__ import annotations
 
@@ -15,8 +16,14 @@ from kfcourse.lab.variants import load_variants
 from kfcourse.pages import explore, scenes
 from kfcourse.pages.exponents import log_normal
 
-SCALAR = {name: variant for name, variant in load_variants().items() if variant.model.n == 1 == variant.model.p}
-STILL = "data:image/svg+xml," + "%3Csvg xmlns='http://www.w3.org/2000/svg' width='300' height='100'/%3E"
+SCALAR = {
+    name: variant
+    for name, variant in load_variants().items()
+    if variant.model.n == 1 == variant.model.p
+}
+STILL = (
+    "data:image/svg+xml," + "%3Csvg xmlns='http://www.w3.org/2000/svg' width='300' height='100'/%3E"
+)
 ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>Figure</title></head><body>
 <figure id="{name}"><img src="{still}" alt="still">{html}<figcaption>Caption</figcaption></figure></body></html>"""
@@ -54,14 +61,26 @@ def sine_and_lines() -> str:
 
 
 def lab_gains() -> str:
-    """Three estimates at once, in the letters of the chapter on the lab's filters, with T = 0.001 and H = 0.8."""
+    """Three estimates at once, in the letters of the chapter on the lab's filters, with T = 0.001
+    and H = 0.8."""
     lam, y, p = sp.symbols("lambda y p", real=True)
     Psi = sp.Rational("0.8125") * p + sp.Rational("0.0025") * (lam / sp.Rational("0.9")) ** 2
     F = Psi + sp.Rational("0.0004") * (lam**4 + 6 * lam**2 * Psi + 3 * Psi**2)
     best = lam + Psi / F * (y - lam)
-    estimates = {"aof-gaussian": best, "fos-gaussian": best.subs(p, 0.001), "duof": lam + 0.8 * (y - lam) + 0.01}
+    estimates = {
+        "aof-gaussian": best,
+        "fos-gaussian": best.subs(p, 0.001),
+        "duof": lam + 0.8 * (y - lam) + 0.01,
+    }
     return explore.gains(
-        "fig-lab-gains", lam, y, p, estimates, [[0, 1], [1, 0.9]], (1e-5, 0.02), {"lambda": 2, "y": 3, "p": 0.006}
+        "fig-lab-gains",
+        lam,
+        y,
+        p,
+        estimates,
+        [[0, 1], [1, 0.9]],
+        (1e-5, 0.02),
+        {"lambda": 2, "y": 3, "p": 0.006},
     )
 
 
@@ -72,8 +91,11 @@ def kalman_step(lam, Psi, y, Q=0.25, R=1):
     return z, p, 0.9 * z, 0.81 * p + Q
 
 
-RECORD = np.random.default_rng(5).standard_normal((2, 60)).round(3)  # states and measurements; any numbers will do
-WALK = Model.define("c*x + e*v", "g*x + f*w", dict(c=0.95, e=0.3, g=1, f=1), prior=dict(variance=0.92))
+# states and measurements; any numbers will do
+RECORD = np.random.default_rng(5).standard_normal((2, 60)).round(3)
+WALK = Model.define(
+    "c*x + e*v", "g*x + f*w", dict(c=0.95, e=0.3, g=1, f=1), prior=dict(variance=0.92)
+)
 WALKED = simulate(WALK, 50, 40, seed=3)
 Delta, n, v = sp.symbols("Delta n v", real=True)
 sigma = sp.Symbol("sigma", real=True)
@@ -81,19 +103,39 @@ SHAKEN = Delta - sp.sin(Delta) / (sigma**2 + 1) + n / 5 + v * sigma / 10
 HILLS = (1 - sp.cos(Delta)) / sigma
 DRAWS = np.random.default_rng(8).standard_normal((3, 2, 100)).round(3)
 ONE_DISTANCE = sp.exp(log_normal(x, -1, 2) + log_normal(1.85, PLACE, sp.Rational(1, 100)))
-MAP = json.loads((Path(explore.__file__).parents[2] / "book" / "front-map.json").read_text(encoding="utf-8"))
+MAP = json.loads(
+    (Path(explore.__file__).parents[2] / "book" / "front-map.json").read_text(encoding="utf-8")
+)
 
 MADE = {
-    "fig-live-lab": lambda: explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")}),
-    "fig-two-beats": lambda: explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2),
+    "fig-live-lab": lambda: explore.live_lab(
+        "fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")}
+    ),
+    "fig-two-beats": lambda: explore.two_beats(
+        "fig-two-beats", x, y, following, *BEATS, PLACE, 2.2
+    ),
     "fig-better-line": sine_and_lines,
     "fig-lab-gains": lab_gains,
-    "fig-ten-minutes": lambda: scenes.one_measurement("fig-ten-minutes", kalman_step, *RECORD, 1, 5.0, (0, 1), (0.25, 1)),
-    "fig-consistency-faults": lambda: scenes.hidden_fault("fig-consistency-faults", WALK, WALKED.x[..., 0], WALKED.y[..., 0]),
-    "fig-slips-ball": lambda: scenes.slip(
-        "fig-slips-ball", Delta, (n, v), sigma, SHAKEN, HILLS, DRAWS, dict(sigma=2.0, draw=1, k=30), (0.5, 4.0)
+    "fig-ten-minutes": lambda: scenes.one_measurement(
+        "fig-ten-minutes", kalman_step, *RECORD, 1, 5.0, (0, 1), (0.25, 1)
     ),
-    "fig-grid-nodes": lambda: scenes.grid_step("fig-grid-nodes", x, ONE_DISTANCE, 1.0, (-5, 5), (0.05, 2.0)),
+    "fig-consistency-faults": lambda: scenes.hidden_fault(
+        "fig-consistency-faults", WALK, WALKED.x[..., 0], WALKED.y[..., 0]
+    ),
+    "fig-slips-ball": lambda: scenes.slip(
+        "fig-slips-ball",
+        Delta,
+        (n, v),
+        sigma,
+        SHAKEN,
+        HILLS,
+        DRAWS,
+        dict(sigma=2.0, draw=1, k=30),
+        (0.5, 4.0),
+    ),
+    "fig-grid-nodes": lambda: scenes.grid_step(
+        "fig-grid-nodes", x, ONE_DISTANCE, 1.0, (-5, 5), (0.05, 2.0)
+    ),
     "front": lambda: scenes.who_leads("front", MAP, (2, 0.4)),
 }
 

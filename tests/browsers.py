@@ -7,7 +7,8 @@ import pytest
 
 from kfcourse.notebooks.execution import BROWSERS
 
-# The suggestions of the address bar, which nobody sees here, are two pages of their own in each window: a CPU-second.
+# The suggestions of the address bar, which nobody sees here, are two pages of their own in each
+# window: a CPU-second.
 WITHOUT = "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup"
 
 
@@ -27,7 +28,8 @@ def chromium():
 
 @contextmanager
 def offline(browser):
-    """new_tab(path, text, **options) -> a tab for the page of that text, in the file `path`, from which alone it may load.
+    """new_tab(path, text, **options) -> a tab for the page of that text, in the file `path`, from
+    which alone it may load.
 
     What the page complains of, or loads from elsewhere, fails the test at its end.
     """
@@ -35,14 +37,18 @@ def offline(browser):
 
     def new_tab(path, text, **options):
         path.write_text(text, encoding="utf-8")
-        context = browser.new_context(offline=True, **({"viewport": {"width": 900, "height": 1000}} | options))
+        context = browser.new_context(
+            offline=True, **({"viewport": {"width": 900, "height": 1000}} | options)
+        )
         contexts.append(context)
         tab = context.new_page()
         tab.set_default_timeout(20_000)
         tab.on("console", lambda message: problems.append(message.text))
         tab.on("pageerror", lambda error: problems.append(str(error)))
         own = (path.as_uri(), "blob:", "data:")
-        tab.on("request", lambda one: one.url.startswith(own) or problems.append(f"loads {one.url}"))
+        tab.on(
+            "request", lambda one: one.url.startswith(own) or problems.append(f"loads {one.url}")
+        )
         return tab
 
     yield new_tab

@@ -14,6 +14,7 @@ def variant53() -> Model:
 
 @pytest.fixture
 def no_figures(monkeypatch):
-    """Drawing takes most of the time of a report; for tests of its text, and of what becomes of files."""
+    """Drawing takes most of the time of a report; for tests of its text, and of what becomes of
+    files."""
     monkeypatch.setattr(report, "FIGURES", dict.fromkeys(report.FIGURES, lambda *_, **__: None))
     monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())

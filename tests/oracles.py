@@ -1,9 +1,10 @@
-"""Slow reference code, written straight from the lab's page for variant 53 and independent of the package.
+"""Slow reference code, written straight from the lab's page for variant 53 and independent of the
+package.
 
     x' = c x + e x v,   y = g x + f x^2 w,   x_0, v, w ~ N(0, 1),   c = 0.9, e = 0.05, g = 1, f = 0.02
 
-One trajectory at a time in plain floats for the filters without an ensemble; `np.mean`, `np.cov` and
-`np.linalg.pinv` for those whose coefficients are regressions over one.
+One trajectory at a time in plain floats for the filters without an ensemble; `np.mean`, `np.cov`
+and `np.linalg.pinv` for those whose coefficients are regressions over one.
 """
 
 from __future__ import annotations
@@ -42,11 +43,15 @@ def f_gaussian(m, d):
     return G**2 * d + F**2 * (m**4 + 6 * m**2 * d + 3 * d**2)
 
 
-STRUCTURES = {"linearised": (theta_linearised, f_linearised), "gaussian": (theta_gaussian, f_gaussian)}
+STRUCTURES = {
+    "linearised": (theta_linearised, f_linearised),
+    "gaussian": (theta_gaussian, f_gaussian),
+}
 
 
 def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, float]]:
-    """(z_k, p_k) of the linearised or Gaussian AOF along one trajectory; a NaN measurement is skipped."""
+    """(z_k, p_k) of the linearised or Gaussian AOF along one trajectory; a NaN measurement is
+    skipped."""
     theta, f = STRUCTURES[kind]
     lam, psi = 0.0, 1.0
     found = []
@@ -72,7 +77,8 @@ def regression(target, *regressors):
 
 
 def gaussian_mean(function, mean, cov, order: int = 40):
-    """M[function(x)], x ~ N(mean, cov), by a Gauss-Hermite product rule; function takes a list of components."""
+    """M[function(x)], x ~ N(mean, cov), by a Gauss-Hermite product rule; function takes a list of
+    components."""
     mean, cov = np.asarray(mean, dtype=float), np.asarray(cov, dtype=float)
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)
     grids = np.meshgrid(*[nodes] * len(mean), indexing="ij")
@@ -84,10 +90,12 @@ def gaussian_mean(function, mean, cov, order: int = 40):
 
 
 def joint_posterior(steps, prior, y):
-    """Means (N, n), covariances (N, n, n) of a linear model's states given a record, and its log density, by one regression.
+    """Means (N, n), covariances (N, n, n) of a linear model's states given a record, and its log
+    density, by one regression.
 
-    `steps`: for each k (A, a, Q, H, b, R) of x' = A x + a + v, y = H x + b + w; y (N, p), NaN where missing.  All states are
-    linear functions of x_0 and the noises; the joint law of states and measurements is written down, and conditioned once.
+    `steps`: for each k (A, a, Q, H, b, R) of x' = A x + a + v, y = H x + b + w; y (N, p), NaN where
+    missing.  All states are linear functions of x_0 and the noises; the joint law of states and
+    measurements is written down, and conditioned once.
     """
     m, P = prior
     n, size = len(m), len(steps)
@@ -110,15 +118,19 @@ def joint_posterior(steps, prior, y):
     F = H @ covs @ H.T + noise
     K = np.linalg.solve(F, H @ covs).T
     mean, cov = mean + K @ residual, covs - K @ H @ covs
-    log_density = -0.5 * (residual @ np.linalg.solve(F, residual) + np.linalg.slogdet(2 * np.pi * F).logabsdet)
+    log_density = -0.5 * (
+        residual @ np.linalg.solve(F, residual) + np.linalg.slogdet(2 * np.pi * F).logabsdet
+    )
     blocks = [slice(k * n, (k + 1) * n) for k in range(size)]
     return np.array([mean[b] for b in blocks]), np.array([cov[b, b] for b in blocks]), log_density
 
 
 class Changing:
-    """A linear model whose matrices, constants and noises change with time and input; as text, and as arrays typed apart."""
+    """A linear model whose matrices, constants and noises change with time and input; as text, and
+    as arrays typed apart."""
 
-    U = (0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2, 1.1)  # each step another: one too early or too late is seen
+    # each step another: one too early or too late is seen
+    U = (0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2, 1.1)
     laws: ClassVar = {
         "prior": (np.array([1.0, -0.5]), np.array([[1.0, 0.3], [0.3, 0.8]])),
         "state_noise": (np.array([0.2, -0.1]), np.array([[0.5, 0.1], [0.1, 0.3]])),
@@ -136,10 +148,16 @@ class Changing:
         """A, constant, Q, H, constant, R of each step, as `joint_posterior` takes them."""
         _, (m_v, D_v), (m_w, D_w) = self.laws.values()
         each = map(self.at, range(count))
-        return [(A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T) for A, B, a, H, C, b in each]
+        return [
+            (A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T)
+            for A, B, a, H, C, b in each
+        ]
 
     def model(self) -> Model:
-        state = ["(0.9 + 0.1*sin(k))*x1 + 0.2*x2 + (1 + t)*v1 + u", "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1"]
+        state = [
+            "(0.9 + 0.1*sin(k))*x1 + 0.2*x2 + (1 + t)*v1 + u",
+            "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1",
+        ]
         meter = ["x1 + 0.1*k*x2 + (2 if t < 1 else 1)*w1 + u**2", "x2 + w2 + cos(t)"]
         laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
         return Model.define(state, meter, inputs={"u": self.U}, interval=0.5, **laws)

@@ -1,6 +1,7 @@
 """The built book: complete, executed, and readable without a network.
 
-`make test` builds the book first and sets KFCOURSE_BOOK=required; elsewhere a missing book skips these tests.
+`make test` builds the book first and sets KFCOURSE_BOOK=required; elsewhere a missing book skips
+these tests.
 """
 
 from __future__ import annotations
@@ -27,11 +28,26 @@ EXECUTED = ROOT / "_build" / "jupyter_execute"
 TOC = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
 CHAPTERS = [chapter for part in TOC["parts"] for chapter in part["chapters"]]
 SHELF = [TOC["root"], *(chapter["file"] for chapter in CHAPTERS)]
-PAGES = [*SHELF, *(section["file"] for chapter in CHAPTERS for section in chapter.get("sections", []))]
+PAGES = [
+    *SHELF,
+    *(section["file"] for chapter in CHAPTERS for section in chapter.get("sections", [])),
+]
 SOURCES = {page: ROOT / "book" / f"{page}.md" for page in SHELF}  # some are made with the book
-NOTEBOOKS = [page for page, source in SOURCES.items() if source.exists() and "{code-cell}" in source.read_text(encoding="utf-8")]
+NOTEBOOKS = [
+    page
+    for page, source in SOURCES.items()
+    if source.exists() and "{code-cell}" in source.read_text(encoding="utf-8")
+]
 LOCAL = ("file:", "data:", "blob:")
-LOADS = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "object": "data", "image": "href"}
+LOADS = {
+    "script": "src",
+    "link": "href",
+    "img": "src",
+    "iframe": "src",
+    "source": "src",
+    "object": "data",
+    "image": "href",
+}
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +59,8 @@ def built() -> None:
 
 
 class Resources(HTMLParser):
-    """Addresses of everything a page loads by itself, and of what it loads when it is opened, but fonts of its style sheets."""
+    """Addresses of everything a page loads by itself, and of what it loads when it is opened, but
+    fonts of its style sheets."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -81,7 +98,9 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
 
 def test_style_sheets_load_only_local_files() -> None:
     for sheet in (HTML / "_static").rglob("*.css"):
-        assert not re.search(r"(@import\s+|url\()\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet
+        assert not re.search(
+            r"(@import\s+|url\()\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")
+        ), sheet
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS)
@@ -98,7 +117,9 @@ def test_notebook_is_executed_without_errors(page: str) -> None:
 
 def test_no_notebook_is_left_out() -> None:
     assert NOTEBOOKS
-    assert {path.relative_to(EXECUTED).with_suffix("").as_posix() for path in EXECUTED.rglob("*.ipynb")} == set(NOTEBOOKS)
+    assert {
+        path.relative_to(EXECUTED).with_suffix("").as_posix() for path in EXECUTED.rglob("*.ipynb")
+    } == set(NOTEBOOKS)
 
 
 @pytest.fixture(scope="module")
@@ -113,16 +134,27 @@ def only_tab(browser):
     problems: list[str] = []
     with browser.new_context(offline=True) as context:
         tab = context.new_page()
-        tab.on("console", lambda message: problems.append(message.text) if message.type in ("error", "warning") else None)
+        tab.on(
+            "console",
+            lambda message: (
+                problems.append(message.text) if message.type in ("error", "warning") else None
+            ),
+        )
         tab.on("pageerror", lambda error: problems.append(str(error)))
         tab.on("requestfailed", lambda request: problems.append(f"failed: {request.url}"))
-        tab.on("request", lambda request: request.url.startswith(LOCAL) or problems.append(f"external: {request.url}"))
+        tab.on(
+            "request",
+            lambda request: (
+                request.url.startswith(LOCAL) or problems.append(f"external: {request.url}")
+            ),
+        )
         yield tab, problems
 
 
 @pytest.fixture
 def window(only_tab):
-    """The tab, empty, and what it complained of since: what fails when a page is left is no complaint of the next one."""
+    """The tab, empty, and what it complained of since: what fails when a page is left is no
+    complaint of the next one."""
     tab, problems = only_tab
     tab.goto("about:blank")
     problems.clear()
@@ -140,7 +172,8 @@ def laid_out(tab, page) -> None:
 
 
 def hover(tab, link) -> None:
-    """The mouse goes to the link until what it leads to is shown: on a busy machine the page may move under it the first time."""
+    """The mouse goes to the link until what it leads to is shown: on a busy machine the page may
+    move under it the first time."""
     from playwright.sync_api import TimeoutError as Late
 
     for attempt in range(4):
@@ -156,7 +189,8 @@ def hover(tab, link) -> None:
 # Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
 SQUEEZED = """() => [...document.querySelectorAll("article img")]
   .filter(e => Math.abs(e.clientWidth / e.clientHeight / (e.naturalWidth / e.naturalHeight) - 1) > 0.05).map(e => e.src)"""
-# Folds with something of their cell below them, or with another fold right below; and icons that the theme did not get from us.
+# Folds with something of their cell below them, or with another fold right below; and icons that
+# the theme did not get from us.
 FOLDS = """() => [...document.querySelectorAll("article details.below-output")]
   .filter(e => e.nextElementSibling || e.parentElement.nextElementSibling?.querySelector(":scope > details.below-output"))
   .map(e => e.textContent)"""
@@ -177,7 +211,8 @@ FIT = """() => {
             .map((e) => e.outerHTML.slice(0, 80)),
     };
 }"""
-# Words and formulas under the mark that opens the code, which stands on the last line of what the code shows.
+# Words and formulas under the mark that opens the code, which stands on the last line of what the
+# code shows.
 UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-output:not([open]) > summary")]
   .filter((mark) => mark.checkVisibility()).flatMap((mark) => {
     const { left, top, bottom } = mark.getBoundingClientRect(), shown = mark.parentElement.previousElementSibling;
@@ -211,9 +246,10 @@ FOUND = """async (context, rules) => {
     const serious = violations.filter(({ impact }) => impact !== "minor");
     return serious.flatMap(({ id, impact, nodes }) => nodes.map((one) => `${impact} ${id}: ${one.html.slice(0, 200)}`));
 }"""
-# Thins out the page, as axe takes as long as there are elements: the insides of formulas, which keep their size and have no text
-# of their own, and spans that only colour code and signatures, beyond those marked.  A few texts of each kind are marked, on all
-# pages of the tab together: what has the same colours, in both themes, and the same size has the same contrast.
+# Thins out the page, as axe takes as long as there are elements: the insides of formulas, which
+# keep their size and have no text of their own, and spans that only colour code and signatures,
+# beyond those marked.  A few texts of each kind are marked, on all pages of the tab together: what
+# has the same colours, in both themes, and the same size has the same contrast.
 THIN = """(themes) => {
     const formulas = [...document.querySelectorAll("mjx-container")].map((e) => [e, e.getBoundingClientRect()]);
     for (const [e, { width, height }] of formulas) {
@@ -252,8 +288,9 @@ THIN = """(themes) => {
     }
     sessionStorage.seen = JSON.stringify(seen);
 }"""
-# Blocks of an article without a marked text keep their size alone, where contrast is all that is asked: axe places every element
-# of the page, for each theme. What has parts out of the flow, which may lie over a marked text, stays whole.
+# Blocks of an article without a marked text keep their size alone, where contrast is all that is
+# asked: axe places every element of the page, for each theme. What has parts out of the flow, which
+# may lie over a marked text, stays whole.
 ONLY_MARKED = """() => {
     const blocks = [], flows = (e) => ["static", "relative"].includes(getComputedStyle(e).position);
     const visit = (e) => {
@@ -269,8 +306,12 @@ ONLY_MARKED = """() => {
 }"""
 THEMES = ["light", "dark"]
 COLOURS = ["color-contrast", "link-in-text-block"]
-WHOLE = "stratonovich"  # has formulas and code of all kinds, and is looked at before it is thinned out, too
-AUDIT = f"(colours) => ({FOUND})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, {{ enabled: false }}])) }})"
+# has formulas and code of all kinds, and is looked at before it is thinned out, too
+WHOLE = "stratonovich"
+AUDIT = (
+    f"(colours) => ({FOUND})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, "
+    f"{{ enabled: false }}])) }})"
+)
 CONTRAST = f"""([theme, colours]) => {{
     document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
     const include = [...document.querySelectorAll("[data-marked]")];
@@ -283,18 +324,34 @@ def show_on(tab, media: str, width: int) -> None:
     tab.evaluate("document.body.style.contentVisibility = 'hidden'")
     tab.emulate_media(media=media)
     tab.set_viewport_size({"width": width, "height": 1000})
-    tab.add_style_tag(content="* { transition: none !important; }")  # colours of a theme, not those on the way to it
+    # colours of a theme, not those on the way to it
+    tab.add_style_tag(content="* { transition: none !important; }")
     tab.evaluate("document.body.style.contentVisibility = ''")
 
 
 # One page of each kind is looked at with every change, all of them every night.
-KINDS = ["intro", WHOLE, "comparison", "consistency", "manual/b-aof", "glossary", "package/kfcourse.filters", "search", "404"]
-OTHERS = [pytest.param(page, marks=pytest.mark.slow) for page in (*PAGES, "genindex", "py-modindex") if page not in KINDS]
+KINDS = [
+    "intro",
+    WHOLE,
+    "comparison",
+    "consistency",
+    "manual/b-aof",
+    "glossary",
+    "package/kfcourse.filters",
+    "search",
+    "404",
+]
+OTHERS = [
+    pytest.param(page, marks=pytest.mark.slow)
+    for page in (*PAGES, "genindex", "py-modindex")
+    if page not in KINDS
+]
 
 
 @pytest.mark.parametrize("page", [*KINDS, *OTHERS])
 def test_page_in_a_browser_without_network(window, page: str) -> None:
-    """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; code is folded."""
+    """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark;
+    code is folded."""
     tab, problems = window
     path = HTML / f"{page}.html"
     tab.set_viewport_size({"width": 390, "height": 1000})
@@ -309,7 +366,9 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     assert tab.evaluate(ICONS) == [], "an icon that _static/icons.css does not draw"
 
     if page in NOTEBOOKS:
-        assert tab.evaluate(TOO_SMALL) == [], "letters in figures too small to be read on a telephone"
+        assert tab.evaluate(TOO_SMALL) == [], (
+            "letters in figures too small to be read on a telephone"
+        )
     for width in (390, 768):
         tab.set_viewport_size({"width": width, "height": 1000})
         assert tab.evaluate(FIT)["page"] <= 0, f"the page scrolls sideways at {width} px"
@@ -321,15 +380,22 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     wide = tab.evaluate(FIT)
     assert wide["page"] <= 0 and wide["code"] == [], "at 1280 px a page scrolls, or a code cell"
     if page in NOTEBOOKS:
-        assert tab.evaluate("document.querySelector('article').scrollHeight") <= LONGEST, "fold what a first reader may pass over"
+        assert tab.evaluate("document.querySelector('article').scrollHeight") <= LONGEST, (
+            "fold what a first reader may pass over"
+        )
     assert tab.evaluate(UNDER_A_MARK) == [], "the mark of the code lies on text"
-    assert tab.evaluate(TOO_WIDE) == [], "a formula scrolls sideways at 1280 px: break it, or name its parts"
+    assert tab.evaluate(TOO_WIDE) == [], (
+        "a formula scrolls sideways at 1280 px: break it, or name its parts"
+    )
     tab.evaluate(AXE)
     whole = tab.evaluate(AUDIT, COLOURS) if page == WHOLE else []
     tab.evaluate(THIN, THEMES)
     whole += tab.evaluate(AUDIT, COLOURS)
     tab.evaluate(ONLY_MARKED)
-    assert [*whole, *itertools.chain(*(tab.evaluate(CONTRAST, [theme, COLOURS]) for theme in THEMES))] == []
+    assert [
+        *whole,
+        *itertools.chain(*(tab.evaluate(CONTRAST, [theme, COLOURS]) for theme in THEMES)),
+    ] == []
 
 
 def test_the_keyboard_reaches_the_text_first(window):
@@ -340,11 +406,16 @@ def test_the_keyboard_reaches_the_text_first(window):
     assert tab.evaluate("document.activeElement.checkVisibility()")
     assert tab.locator("main#main-content").count() == 1
     formulas = tab.locator("div.math")
-    assert formulas.count() == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count() > 0
+    assert (
+        formulas.count()
+        == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count()
+        > 0
+    )
 
 
 def test_a_reference_shows_what_it_leads_to(window):
-    """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
+    """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link
+    stays a link."""
     tab, problems = window
     show_on(tab, "screen", 1280)
     laid_out(tab, "comparison")
@@ -362,8 +433,13 @@ def test_a_reference_shows_what_it_leads_to(window):
     tab.keyboard.press("Tab")
     assert box.locator("img").is_visible()
     assert figure.get_attribute("aria-describedby") == "kf-preview"
-    assert tab.evaluate("new Set([...document.querySelectorAll('[id]')].map((e) => e.id)).size") == tab.locator("[id]").count()
-    left, right = box.evaluate("e => [e.getBoundingClientRect().left, e.getBoundingClientRect().right]")
+    assert (
+        tab.evaluate("new Set([...document.querySelectorAll('[id]')].map((e) => e.id)).size")
+        == tab.locator("[id]").count()
+    )
+    left, right = box.evaluate(
+        "e => [e.getBoundingClientRect().left, e.getBoundingClientRect().right]"
+    )
     assert 0 <= left < right <= 1280
     tab.keyboard.press("Escape")
     assert not box.is_visible() and figure.get_attribute("aria-describedby") is None
@@ -388,7 +464,8 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
         tab.locator(f"#{name}").wait_for()
     assert problems == []
     tab.goto("about:blank")
-    problems.clear()  # pictures or the page's icon, asked for and not there yet when the page was left
+    # pictures or the page's icon, asked for and not there yet when the page was left
+    problems.clear()
     tab.goto((HTML / "integration.html").as_uri() + "#fig-integration-car")
     tab.locator("#fig-integration-car").wait_for()
     assert folds.evaluate_all("all => all.map((e) => e.open)") == [False, True]
@@ -401,10 +478,13 @@ def test_figures_are_counted_on_their_page(page):
     text = (HTML / f"{page}.html").read_text(encoding="utf-8")
     chapter = re.search(r"<title>(\d+)\. ", text)
     counted = re.findall(r'caption-number">Figure ([\d.]+?)\.? ?<', text)
-    assert counted == [f"{chapter[1]}.{place}" if chapter else f"{place}" for place in range(1, len(counted) + 1)]
+    assert counted == [
+        f"{chapter[1]}.{place}" if chapter else f"{place}" for place in range(1, len(counted) + 1)
+    ]
 
 
-# How far an element is from the upper edge of what may be read: asked until it stays there, or for ten seconds.
+# How far an element is from the upper edge of what may be read: asked until it stays there, or for
+# ten seconds.
 COME_TO_REST = """(name) => new Promise((rest) => {
     let there = 0, asked = 0;
     const ask = () => {
@@ -436,7 +516,11 @@ def test_contents_on_a_telephone(browser, page):
 def test_a_formula_stays_with_its_comma(page):
     """And with its bracket: no text that begins behind a formula begins with a mark."""
     html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
-    alone = [formula for formula in html.select("article span.math") if "kf-together" not in formula.parent.get("class", [])]
+    alone = [
+        formula
+        for formula in html.select("article span.math")
+        if "kf-together" not in formula.parent.get("class", [])
+    ]
     assert alone and html.select("article .kf-together > span.math")
     for formula in alone:
         before, after = formula.previous_sibling, formula.next_sibling
@@ -449,8 +533,15 @@ def test_formulas_are_there_without_scripts(browser):
     with browser.new_context(offline=True, java_script_enabled=False) as context:
         tab = context.new_page()
         tab.goto((HTML / f"{WHOLE}.html").as_uri())
-        assert tab.locator(".math").count() == tab.locator(".math > mjx-container > mjx-math").count() > 100
-        assert tab.locator("div.math").count() == tab.locator("div.math > mjx-container[tabindex='0'][aria-label]").count()
+        assert (
+            tab.locator(".math").count()
+            == tab.locator(".math > mjx-container > mjx-math").count()
+            > 100
+        )
+        assert (
+            tab.locator("div.math").count()
+            == tab.locator("div.math > mjx-container[tabindex='0'][aria-label]").count()
+        )
         box = tab.locator("div.math mjx-math").first.bounding_box()
         assert box["width"] > 100 and box["height"] > 10
 
@@ -473,7 +564,9 @@ def test_pages_are_light():
 def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     tab, _ = window
     tab.goto((HTML / "manual/b-aof.html").as_uri())
-    closed = "() => [...document.querySelectorAll('article details:not(.kf-code)')].map((e) => e.open)"
+    closed = (
+        "() => [...document.querySelectorAll('article details:not(.kf-code)')].map((e) => e.open)"
+    )
     assert not any(tab.evaluate(closed))
     tab.evaluate("addEventListener('beforeprint', () => { window.atPrint = (" + closed + ")(); })")
     tab.pdf()
@@ -481,20 +574,33 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     assert len(at_print) > 3 and all(at_print)
     assert not any(tab.evaluate(closed)), "closed again on the screen"
     show_on(tab, "print", PAPER)
-    assert tab.locator("details.kf-code").count() == 1 and not tab.locator("details.kf-code").is_visible()
+    assert (
+        tab.locator("details.kf-code").count() == 1
+        and not tab.locator("details.kf-code").is_visible()
+    )
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
-    found = re.search(r'class="kf-count" href="equations.html#([^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
+    found = re.search(
+        r'class="kf-count" href="equations.html#([^"]+)"',
+        (HTML / f"{page}.html").read_text(encoding="utf-8"),
+    )
     if found:
         assert f'id="{found[1]}"' in (HTML / "equations.html").read_text(encoding="utf-8")
 
 
 def displayed(page: str) -> list[str]:
-    """The displayed formulas of a page in the letters of their MathML, without what only aligns or numbers them."""
-    found = re.findall(r'<math display="block".*?</math>', (HTML / f"{page}.html").read_text(encoding="utf-8"), re.DOTALL)
-    return ["".join(unescape(one).strip() for one in re.split("<[^>]*>", formula)) for formula in found]
+    """The displayed formulas of a page in the letters of their MathML, without what only aligns or
+    numbers them."""
+    found = re.findall(
+        r'<math display="block".*?</math>',
+        (HTML / f"{page}.html").read_text(encoding="utf-8"),
+        re.DOTALL,
+    )
+    return [
+        "".join(unescape(one).strip() for one in re.split("<[^>]*>", formula)) for formula in found
+    ]
 
 
 def test_the_page_of_all_equations_has_them_all():
@@ -514,11 +620,15 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
     nbformat.validate(notebook)
     assert started.value.suggested_filename == "ten-minutes.ipynb"
     text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
-    assert text.startswith("# Ten minutes") and not re.search(r"\{[a-z.][\w:-]*\}|^:\w+:", text, re.MULTILINE), (
-        "words only the book knows"
-    )
+    assert text.startswith("# Ten minutes") and not re.search(
+        r"\{[a-z.][\w:-]*\}|^:\w+:", text, re.MULTILINE
+    ), "words only the book knows"
     code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
-    assert code == [cell.source for cell in nbformat.read(EXECUTED / "ten-minutes.ipynb", 4).cells if cell.cell_type == "code"]
+    assert code == [
+        cell.source
+        for cell in nbformat.read(EXECUTED / "ten-minutes.ipynb", 4).cells
+        if cell.cell_type == "code"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -540,11 +650,17 @@ def test_search_finds_sections_and_quotes_them(window, words, page, section):
     tab.goto((HTML / "search.html").as_uri() + f"?q={quote(words)}")
     rows = tab.locator("#search-results li")
     rows.first.wait_for()
-    found = [urlsplit(address) for address in rows.locator("a").evaluate_all("links => links.map((link) => link.href)")]
-    assert (page, section) in [(place.path.partition("/html/")[2], place.fragment) for place in found[:5]]
+    found = [
+        urlsplit(address)
+        for address in rows.locator("a").evaluate_all("links => links.map((link) => link.href)")
+    ]
+    assert (page, section) in [
+        (place.path.partition("/html/")[2], place.fragment) for place in found[:5]
+    ]
     assert all((HTML / unquote(place.path).partition("/html/")[2]).exists() for place in found)
     assert all(row.locator("p").inner_text() for row in rows.all()[:5])
-    assert tab.locator("#search-results mark").count() > 1  # of five: not where only a title has the words
+    # of five: not where only a title has the words
+    assert tab.locator("#search-results mark").count() > 1
     assert problems == []
 
 

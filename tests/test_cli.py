@@ -73,7 +73,11 @@ def refused(result, *words):
 
 
 def snapshot(folder):
-    return {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        path.relative_to(folder): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 # --- listing
@@ -89,15 +93,37 @@ def test_variants_are_listed_with_titles_and_equations(call):
 
 
 def test_one_bad_variant_is_named_and_stops_no_other(call, no_report, tmp_path):
-    (tmp_path / "mine.toml").write_text(EXAMPLE + '[variants.bad]\nstate = "0.9*x + q"\nmeter = "x + w"\n', encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(
+        EXAMPLE + '[variants.bad]\nstate = "0.9*x + q"\nmeter = "x + w"\n', encoding="utf-8"
+    )
     listed = call("variants", "--variants", "mine.toml")
-    assert listed.exit_code == 1 and "Error: variant bad in mine.toml: unknown symbol 'q'" in listed.output
+    assert (
+        listed.exit_code == 1
+        and "Error: variant bad in mine.toml: unknown symbol 'q'" in listed.output
+    )
     assert len(re.findall(r"no title", listed.output)) == 4
-    checked = call("variants", "--variants", "mine.toml", "--variant", "53", "--variant", "bad", "--check", "--runs", 1000)
-    assert checked.exit_code == 1 and "Error: variant bad" in checked.output and re.search(r"(?m)^53 ", checked.output)
+    checked = call(
+        "variants",
+        "--variants",
+        "mine.toml",
+        "--variant",
+        "53",
+        "--variant",
+        "bad",
+        "--check",
+        "--runs",
+        1000,
+    )
+    assert (
+        checked.exit_code == 1
+        and "Error: variant bad" in checked.output
+        and re.search(r"(?m)^53 ", checked.output)
+    )
     assert call("variants", "--variants", "mine.toml", "--variant", "53").exit_code == 0
     assert call("lab", "53", "--variants", "mine.toml", *QUICK).exit_code == 0
-    refused(call("lab", "bad", "--variants", "mine.toml", *QUICK), "variant bad in mine.toml", "'q'")
+    refused(
+        call("lab", "bad", "--variants", "mine.toml", *QUICK), "variant bad in mine.toml", "'q'"
+    )
 
 
 @pytest.mark.parametrize("option", ["-h", "--help", "--version"])
@@ -121,9 +147,12 @@ def test_the_lab_of_variant_53(call, tmp_path):
             assert len(values) == 12
             assert all(isinstance(value, float) and math.isfinite(value) for value in values)
     assert all(error >= 0 for errors in data["standard_error"].values() for error in errors)
-    for name in LAB:  # they are variances; all begin near the note's 11.9e-4 and fall a thousandfold in eleven steps
+    # they are variances; all begin near the note's 11.9e-4 and fall a thousandfold in eleven steps
+    for name in LAB:
         assert all(value > 0 for value in data["error_variance"][name])
-        assert abs(data["error_variance"][name][0] - 11.92e-4) <= 5 * data["standard_error"][name][0]
+        assert (
+            abs(data["error_variance"][name][0] - 11.92e-4) <= 5 * data["standard_error"][name][0]
+        )
         assert data["error_variance"][name][11] < 1e-4
     html = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert "<math" in html
@@ -139,11 +168,20 @@ def test_the_lab_of_variant_53(call, tmp_path):
 def test_every_filter_can_be_chosen(call, no_report, tmp_path):
     result = call("lab", "53", *QUICK, "--filters", ",".join(FILTERS), "--json", "n.json")
     assert result.exit_code == 0, result.output
-    assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == set(FILTERS)
+    assert set(
+        json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]
+    ) == set(FILTERS)
 
 
-def test_a_file_of_ones_own_with_a_shipped_variant_gives_the_same_numbers(call, no_report, tmp_path):
-    assert call("lab", "53", *QUICK, "--variants", "mine.toml", "--json", "a.json", "--out", "a").exit_code == 0
+def test_a_file_of_ones_own_with_a_shipped_variant_gives_the_same_numbers(
+    call, no_report, tmp_path
+):
+    assert (
+        call(
+            "lab", "53", *QUICK, "--variants", "mine.toml", "--json", "a.json", "--out", "a"
+        ).exit_code
+        == 0
+    )
     assert call("lab", "53", *QUICK, "--json", "b.json", "--out", "b").exit_code == 0
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
@@ -201,10 +239,15 @@ def test_a_derivation_is_checked_line_by_line(call, tmp_path):
     assert call("check", file, "--variant", "53").exit_code == 0
 
 
-@pytest.mark.parametrize(("words", "extra"), [("lab 53 --filters laof gaof", "gaof"), ("solutions --out . --sets f j", "j")])
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [("lab 53 --filters laof gaof", "gaof"), ("solutions --out . --sets f j", "j")],
+)
 def test_names_without_a_comma_are_told_how_they_are_separated(call, words, extra):
     done = call(*words.split())
-    assert done.exit_code == 2 and f"extra argument ({extra}): separate names by commas" in done.output
+    assert (
+        done.exit_code == 2 and f"extra argument ({extra}): separate names by commas" in done.output
+    )
 
 
 @pytest.mark.parametrize(
@@ -242,18 +285,33 @@ def test_no_filter_is_an_error(call, names):
 
 def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):
     names = "aof-gaussian,fos-gaussian"
-    line = refused(call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", names), "tan(x)", "aof-gaussian")
+    line = refused(
+        call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", names),
+        "tan(x)",
+        "aof-gaussian",
+    )
     assert "unscented" in line or "gauss_hermite" in line
 
 
-def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(call, no_figures, tmp_path):
+def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(
+    call, no_figures, tmp_path
+):
     result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--out", "r", "--json", "r.json")
     assert result.exit_code == 0
     for name in ("GAOF", "GFOS", "GMFOS"):
-        assert f"{name} left out: the package knows no closed-form Gaussian mean of the term tan(x)" in result.output
+        assert (
+            f"{name} left out: the package knows no closed-form Gaussian mean of the term tan(x)"
+            in result.output
+        )
     numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
     assert set(numbers["left_out"]) == {"aof-gaussian", "fos-gaussian", "mfos-gaussian"}
-    assert set(numbers["error_variance"]) == {"aof-linearised", "duof", "fos-linearised", "mfos-linearised", "aof-exact"}
+    assert set(numbers["error_variance"]) == {
+        "aof-linearised",
+        "duof",
+        "fos-linearised",
+        "mfos-linearised",
+        "aof-exact",
+    }
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
     assert "<td>GAOF</td><td>no</td>" in page and "Which filters this model admits" in page
     assert "<td>UKF</td>" in page and "<td>GHKF</td>" in page
@@ -263,9 +321,15 @@ def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(call
 def test_filters_lists_which_are_admissible(call):
     result = call("filters", "mine.toml", "tan")
     assert result.exit_code == 0
-    lines = {line.split()[0]: line for line in result.output.splitlines() if line.split()[0] in FILTERS}
+    lines = {
+        line.split()[0]: line for line in result.output.splitlines() if line.split()[0] in FILTERS
+    }
     assert list(lines) == list(FILTERS)
-    assert " no " in lines["aof-gaussian"] and "tan(x)" in lines["aof-gaussian"] and lines["duof"].split()[-1] == "yes"
+    assert (
+        " no " in lines["aof-gaussian"]
+        and "tan(x)" in lines["aof-gaussian"]
+        and lines["duof"].split()[-1] == "yes"
+    )
     assert call("filters", "tan", "--variants", "mine.toml").output == result.output
     assert "aof-exact" in call("filters", "53").output
     refused(call("filters", "nothing.toml", "tan"), "nothing.toml")
@@ -309,7 +373,9 @@ def test_impossible_numbers_are_refused(call, no_computation, option):
     assert "Traceback" not in result.output
 
 
-def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(call, no_computation, monkeypatch, tmp_path):
+def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(
+    call, no_computation, monkeypatch, tmp_path
+):
     product = "*".join(f"(x + {k})" for k in range(23))
     table = f'[variants.long]\nstate = "1e-30*{product} + v"\nmeter = "x + w"\n'
     (tmp_path / "long.toml").write_text(table, encoding="utf-8")
@@ -322,7 +388,10 @@ def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(call, no
     assert "simplify" in line
 
 
-@pytest.mark.parametrize("error", [RuntimeError("double\nsubscript"), OSError(errno.ENOSPC, "No space left on device", "f")])
+@pytest.mark.parametrize(
+    "error",
+    [RuntimeError("double\nsubscript"), OSError(errno.ENOSPC, "No space left on device", "f")],
+)
 def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypatch, error):
     def failing(variant, result, folder, *chosen):
         (folder / "accuracy.svg").write_text("finished", encoding="utf-8")
@@ -333,13 +402,21 @@ def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypat
     line = refused(result)
     assert ("RuntimeError: double subscript" in line) or ("No space left" in line)
     assert "GAOF" in result.output
-    assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"aof-gaussian", "duof"}
+    assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {
+        "aof-gaussian",
+        "duof",
+    }
     assert not (tmp_path / "lab-53").exists()
 
 
-def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, no_figures, tmp_path, monkeypatch):
+def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(
+    call, no_figures, tmp_path, monkeypatch
+):
     """Of both reports: what is new appears when all of it is written."""
-    assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 0
+    assert (
+        call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code
+        == 0
+    )
     before = snapshot(tmp_path)
 
     def ended(*arguments):
@@ -347,11 +424,18 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, 
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "write_report", ended)
-    assert call("lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 130
+    assert (
+        call(
+            "lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r", "--report", "ru"
+        ).exit_code
+        == 130
+    )
     assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
 
 
 def test_a_warning_is_one_line_and_numpy_s_are_none(call, no_report):
-    result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", "aof-unscented,duof")
+    result = call(
+        "lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", "aof-unscented,duof"
+    )
     (line,) = [line for line in result.output.splitlines() if "may be infinite" in line]
     assert line.startswith("Warning: UKF: unscented: ")

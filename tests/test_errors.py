@@ -1,4 +1,5 @@
-"""Errors: another kind of value than is expected is refused in words; what a report needs survives a process."""
+"""Errors: another kind of value than is expected is refused in words; what a report needs survives
+a process."""
 
 import pickle
 
@@ -37,13 +38,28 @@ Y = np.zeros(3)
     [
         (lambda: aof(MODEL), r"^aof expects a Structure, got Model: give linearised\(model\)"),
         (lambda: fos(FILTER), r"^fos expects a Structure, got Filter aof-linearised: give linear"),
-        (lambda: run(STRUCTURE, Y), r"^a run expects a Filter, got Structure linearised: give a filter"),
-        (lambda: smooth(MODEL, Y), r"^smooth expects a Filter, got Model: give a filter, such as aof"),
-        (lambda: likelihood(duof(MODEL), Y), r"^likelihood expects a Filter, got Design duof: .* design"),
+        (
+            lambda: run(STRUCTURE, Y),
+            r"^a run expects a Filter, got Structure linearised: give a filter",
+        ),
+        (
+            lambda: smooth(MODEL, Y),
+            r"^smooth expects a Filter, got Model: give a filter, such as aof",
+        ),
+        (
+            lambda: likelihood(duof(MODEL), Y),
+            r"^likelihood expects a Filter, got Design duof: .* design",
+        ),
         (lambda: gated(Y), r"^gated expects a Filter, got ndarray: give a filter"),
         (lambda: predictions(aof, Y), r"^a run expects a Filter, got function aof: give a filter"),
-        (lambda: gaussian(FILTER), r"^gaussian expects a Model, got Filter aof-lin.*: give a model, .* filter"),
-        (lambda: kalman_filter(STRUCTURE), r"^kalman_filter expects a Model, got Structure linearised"),
+        (
+            lambda: gaussian(FILTER),
+            r"^gaussian expects a Model, got Filter aof-lin.*: give a model, .* filter",
+        ),
+        (
+            lambda: kalman_filter(STRUCTURE),
+            r"^kalman_filter expects a Model, got Structure linearised",
+        ),
         (lambda: particle(Y), r"^particle expects a Model, got ndarray"),
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
         (lambda: pointmass(STRUCTURE), r"^pointmass expects a Model, got Structure linearised"),

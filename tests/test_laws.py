@@ -36,7 +36,9 @@ def test_among_many_matrices_a_singular_broken_or_unknown_one_does_not_disturb_t
     expected, others = gain(cross, cov), np.arange(9) != 7
     for bad in (np.diag([1.0, 0.0, 2.0]), np.ones((3, 3)), -np.eye(3), np.full((3, 3), np.nan)):
         cov[7] = bad
-        np.testing.assert_allclose(gain(cross, cov, broken=True)[others], expected[others], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(
+            gain(cross, cov, broken=True)[others], expected[others], rtol=1e-10, atol=1e-10
+        )
     with pytest.raises(NegativeVariance):
         gain(cross, -np.abs(cov))
 
@@ -44,22 +46,34 @@ def test_among_many_matrices_a_singular_broken_or_unknown_one_does_not_disturb_t
 @pytest.mark.parametrize("ratio", [1e8, 1e12, 1e16])
 @pytest.mark.parametrize("p", [2, 3])
 def test_equal_components_of_one_quantity_share_their_information_whatever_the_prior(ratio, p):
-    """Each of them adds 1/r to the information 1/P: after k steps the variance is 1 / (1/P + k p / r).
+    """Each of them adds 1/r to the information 1/P: after k steps the variance is 1 / (1/P + k p /
+    r).
 
-    The variance is a small difference, so the gain must be backward stable: its error, 1e-16 along the direction in which
-    the measurements agree, is squared and multiplied by P in Joseph's form.
+    The variance is a small difference, so the gain must be backward stable: its error, 1e-16 along
+    the direction in which the measurements agree, is squared and multiplied by P in Joseph's form.
     """
     r = 1e-4
-    law, G, R = Gaussian(np.zeros((1, 1)), np.full((1, 1, 1), ratio * r)), np.ones((1, p, 1)), r * np.eye(p)[None]
+    law, G, R = (
+        Gaussian(np.zeros((1, 1)), np.full((1, 1, 1), ratio * r)),
+        np.ones((1, p, 1)),
+        r * np.eye(p)[None],
+    )
     for k, level in enumerate((100.0, 80.0, 80.0), 1):
-        law = correct(law, measurement(G, R, law)._replace(h=np.tile(law.mean, p)), level + np.arange(p)[None])
+        law = correct(
+            law, measurement(G, R, law)._replace(h=np.tile(law.mean, p)), level + np.arange(p)[None]
+        )
         np.testing.assert_allclose(law.cov.item(), 1 / (1 / (ratio * r) + k * p / r), rtol=1e-7)
-    # F holds r to 1e-16 of P, and no more: the weights are so wrong that the components share, squared in the variance
+    # F holds r to 1e-16 of P, and no more: the weights are so wrong that the components share,
+    # squared in the variance
     np.testing.assert_allclose(law.mean.item(), 260 / 3 + (p - 1) / 2, rtol=1e-5)
 
 
 def test_the_gain_does_not_depend_on_units(rng):
-    cov, cross, units = covariances(rng, 4, 3), rng.normal(size=(4, 2, 3)), np.array([1e-9, 1.0, 1e8])
+    cov, cross, units = (
+        covariances(rng, 4, 3),
+        rng.normal(size=(4, 2, 3)),
+        np.array([1e-9, 1.0, 1e8]),
+    )
     scaled = gain(cross * units, cov * units[:, None] * units)
     np.testing.assert_allclose(scaled * units, gain(cross, cov), rtol=1e-11, atol=1e-11)
 
@@ -73,9 +87,11 @@ def test_a_negative_variance_is_refused(cov):
 
 @pytest.mark.parametrize("rounding", [0, 2e-15, 5e-15])
 def test_a_covariance_that_is_singular_but_for_rounding_is_singular(rounding):
-    """y2 = 2 y1 with a few roundings between them: a difference that is noise must not carry the estimate.
+    """y2 = 2 y1 with a few roundings between them: a difference that is noise must not carry the
+    estimate.
 
-    Solving would put all weight on one of the two, or a large weight of either sign on both; the pseudo-inverse shares it.
+    Solving would put all weight on one of the two, or a large weight of either sign on both; the
+    pseudo-inverse shares it.
     """
     cov = np.array([[1.0, 2.0], [2.0, 4.0 * (1 + rounding)]])
     K = gain(np.array([[1.0, 2.0]]), cov)
@@ -98,7 +114,9 @@ def test_the_correction_is_the_conditional_law(rng, n, p):
     cov = np.linalg.inv(information)
     gained = cov @ transpose(G) @ np.linalg.inv(R)
     np.testing.assert_allclose(posterior.cov, cov, rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(posterior.mean, prior.mean + apply(gained, y), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(
+        posterior.mean, prior.mean + apply(gained, y), rtol=1e-10, atol=1e-10
+    )
     assert np.array_equal(posterior.cov, transpose(posterior.cov))
 
 
@@ -106,7 +124,9 @@ def test_the_correction_is_the_conditional_law(rng, n, p):
 def test_a_meter_that_sees_nothing_leaves_the_prior(rng, n, p):
     # No sensitivity and no variance either (a square meter linearised at 0): K = 0 and p = Psi.
     prior = Gaussian(rng.normal(size=(3, n)), covariances(rng, 3, n))
-    blind = Measurement(np.zeros((3, p)), np.zeros((3, p, n)), np.zeros((3, p, p)), np.zeros((3, p, p)))
+    blind = Measurement(
+        np.zeros((3, p)), np.zeros((3, p, n)), np.zeros((3, p, p)), np.zeros((3, p, p))
+    )
     posterior = correct(prior, blind, np.ones((3, p)))
     np.testing.assert_array_equal(posterior.mean, prior.mean)
     np.testing.assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
@@ -119,8 +139,11 @@ def test_a_sharp_meter_leaves_a_positive_variance_with_its_digits(sharpness, n):
     G, R = np.eye(n)[None], sharpness * np.eye(n)[None]
     posterior = correct(prior, measurement(G, R, prior), np.ones((1, n)))
     expected = sharpness / (1 + sharpness)
-    # Joseph's form adds (1 - K)^2 Psi, K rounded to 1e-16: an absolute 1e-32 beside the 1e-24 of the sharpest.
-    np.testing.assert_allclose(posterior.cov[0], expected * np.eye(n), rtol=1e-7, atol=1e-7 * sharpness)
+    # Joseph's form adds (1 - K)^2 Psi, K rounded to 1e-16: an absolute 1e-32 beside the 1e-24 of
+    # the sharpest.
+    np.testing.assert_allclose(
+        posterior.cov[0], expected * np.eye(n), rtol=1e-7, atol=1e-7 * sharpness
+    )
 
 
 @pytest.mark.parametrize(
@@ -128,14 +151,16 @@ def test_a_sharp_meter_leaves_a_positive_variance_with_its_digits(sharpness, n):
     [
         np.diag([2.0, 0.0]),
         np.ones((2, 2)),
-        np.array([[1.0, 1 + 4e-16], [1 + 4e-16, 1.0]]),  # an eigenvalue of -4e-16: singular, but for rounding
+        # an eigenvalue of -4e-16: singular, but for rounding
+        np.array([[1.0, 1 + 4e-16], [1 + 4e-16, 1.0]]),
         np.zeros((2, 2)),
         np.array([[2.0, 1e-5], [1e-5, 1e-9]]),
     ],
 )
 def test_the_square_root_squares_to_the_covariance(cov):
     root = square_root(cov)
-    np.testing.assert_allclose(root @ root.T, cov, atol=1e-15 * 2)  # rounding relative to the largest eigenvalue
+    # rounding relative to the largest eigenvalue
+    np.testing.assert_allclose(root @ root.T, cov, atol=1e-15 * 2)
 
 
 @pytest.mark.parametrize(("r", "s"), [(1, 1), (2, 1), (1, 2), (2, 3)])
@@ -143,7 +168,8 @@ def test_a_regression_is_least_squares(rng, r, s):
     regressor = rng.normal(size=(60, s)) @ rng.normal(size=(s, s)) + 3
     target = regressor @ rng.normal(size=(s, r)) + rng.normal(size=(60, r)) - 2
     fit = Scatter.of(target, regressor).regression()
-    assert np.array_equal(Scatter.of(target, regressor).regression(r).matrix, fit.matrix)  # of notebooks handed out earlier
+    # of notebooks handed out earlier
+    assert np.array_equal(Scatter.of(target, regressor).regression(r).matrix, fit.matrix)
     design = np.column_stack([regressor, np.ones(60)])
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
     np.testing.assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)
@@ -157,17 +183,22 @@ def test_large_means_do_not_cancel(rng):
     target, regressor = rng.normal(size=(60, 2)) + 1e6, rng.normal(size=(60, 2)) - 1e5
     found = Scatter.of(target, regressor).scatter
     # Means of size 1e6 are rounded to 1e-10; deviations from them are of order 1.
-    np.testing.assert_allclose(found, 60 * np.cov(np.hstack([target, regressor]).T, bias=True), rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(
+        found, 60 * np.cov(np.hstack([target, regressor]).T, bias=True), rtol=1e-7, atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("count", [8191, 8192, 8193, 20_000])
 def test_long_sums_are_cut_without_loss(rng, count):
     column = rng.normal(size=(count, 1))
-    np.testing.assert_allclose(Scatter.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11)
+    np.testing.assert_allclose(
+        Scatter.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11
+    )
 
 
 def test_a_perfect_regression_leaves_no_negative_variance(rng):
-    # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become a variance below 0.
+    # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become
+    # a variance below 0.
     for _ in range(50):
         regressor = rng.normal(size=(30, 2))
         target = regressor @ rng.normal(size=(2, 2))
@@ -175,7 +206,9 @@ def test_a_perfect_regression_leaves_no_negative_variance(rng):
         assert (np.diagonal(fit.residual) >= 0).all()
         # Rounding of sums of 30 products and of a solution whose condition is below 1e2.
         assert abs(fit.residual).max() < 1e-13 * target.var(axis=0).sum()
-        assert Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression().residual.item() >= 0
+        assert (
+            Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression().residual.item() >= 0
+        )
 
 
 def test_the_log_density_is_the_normal_law_s_of_what_was_measured():

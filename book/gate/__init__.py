@@ -1,4 +1,5 @@
-"""The gate of the book: relations that pages type are computed, and a changed letter stops the build.
+"""The gate of the book: relations that pages type are computed, and a changed letter stops the
+build.
 
 tex        formulas as tokens
 values     what letters stand for, and how values add and multiply

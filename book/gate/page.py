@@ -1,19 +1,26 @@
-r"""What each displayed relation of a page is: computed from the page's letters, a definition, quoted, or stated without proof.
+r"""What each displayed relation of a page is: computed from the page's letters, a definition,
+quoted, or stated without proof.
 
-A page `my-chapter.md` that types relations in `$$` or in a box has a file `letters/my_chapter.py` beside it::
+A page `my-chapter.md` that types relations in `$$` or in a box has a file `letters/my_chapter.py`
+beside it::
 
-    def course(rng): return {"p": Indexed(...), ...}     numbers for the letters: a program,
-    western = r"K = PH^TS^{-1}"                          or definitions in LaTeX (gate.worlds)
-    LETTERS = (course, western)                          a relation must hold in one of them, with all its letters
-    SAID = {DEFINITION: [r"x_0\sim\mathcal N(m_0,D_0)",  what cannot be computed, letter by letter, and what it is
-                         "eq-my-model"]}                 by its label: computed all the same, but shown under this name
-    EQUALS = {r"\det M": r"ad-bc"}                       a string in a cell, and what the checked sides beside it say
+    def course(rng): return {"p": Indexed(...), ...}   # numbers for the letters: a program,
+    western = r"K = PH^TS^{-1}"                        # or definitions in LaTeX (gate.worlds)
+    LETTERS = (course, western)  # a relation must hold in one of them, with all its letters
+    # what cannot be computed, letter by letter, and what it is; or by its label: computed all the
+    # same, but shown under this name
+    SAID = {DEFINITION: [r"x_0\sim\mathcal N(m_0,D_0)", "eq-my-model"]}
+    # a string in a cell, and what the checked sides beside it say
+    EQUALS = {r"\det M": r"ad-bc"}
 
-So a changed letter stops the build: what is computed no longer holds, or what was said is no longer there.
+So a changed letter stops the build: what is computed no longer holds, or what was said is no longer
+there.
 
-The key points of a page say again what it has shown: a formula in them is computed, or stands elsewhere on the page, letter by
-letter.  A relation in any other sentence, an answer for instance, holds if the page's letters can read it, in a world of its own
-where need be; only what gives a letter a value or another name, `T=0.1`, holds where it is said and nowhere else.
+The key points of a page say again what it has shown: a formula in them is computed, or stands
+elsewhere on the page, letter by
+letter.  A relation in any other sentence, an answer for instance, holds if the page's letters can
+read it, in a world of its own where need be; only what gives a letter a value or another name,
+`T=0.1`, holds where it is said and nowhere else.
 """
 
 from __future__ import annotations
@@ -44,10 +51,13 @@ CONDITION = "condition"
 _SEEDS = (53, 54)  # what holds for two draws of the numbers is no accident
 _CELL = re.compile(r"^(`{3,})\{code-cell\}[^\n]*\n(.*?)^\1\s*$", re.DOTALL | re.MULTILINE)
 _BOX = re.compile(
-    r"^(`{3,})\{admonition\} ([^\n]*)\n:class:[^\n]*\b(?:algorithm|definition)\b(.*?)^\1\s*$", re.DOTALL | re.MULTILINE
+    r"^(`{3,})\{admonition\} ([^\n]*)\n:class:[^\n]*\b(?:algorithm|definition)\b(.*?)^\1\s*$",
+    re.DOTALL | re.MULTILINE,
 )
 _POINTS = re.compile(r"^(`{3,})\{admonition\} Key points\n(.*?)^\1\s*$", re.DOTALL | re.MULTILINE)
-_DISPLAY = re.compile(r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE)
+_DISPLAY = re.compile(
+    r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE
+)
 _INLINE = re.compile(r"(?<![\\$])\$([^$]+)\$(?!\$)")
 _NO_LETTER = re.compile(r"\\(?:frac|sqrt|cdot|infty|hat|bar|tilde|dot|ddot)\b|'")
 _NUMBER = re.compile(r"(?<![\w.^_{\\])(\d{1,3}(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?)")
@@ -56,8 +66,8 @@ _OPERATOR = re.compile(r"(?:^|\s)([+/]|-|\\frac|\\sqrt|\^ (?:T|\d|\{ - 1 \}))(?=
 
 
 class Formula(NamedTuple):
-    """A formula as a page types it: a "display", in a "box", in a key "point", in a "sentence", or in a cell a "side" or "name"
-    that is printed, not checked."""
+    """A formula as a page types it: a "display", in a "box", in a key "point", in a "sentence", or
+    in a cell a "side" or "name" that is printed, not checked."""
 
     kind: str
     latex: str
@@ -89,17 +99,31 @@ class Letters:
         makers = [world(one) if isinstance(one, str) else one for one in worlds]
         self.worlds = [[make(np.random.default_rng(seed)) for seed in _SEEDS] for make in makers]
         self.said = {normal(text): what for what, texts in said.items() for text in texts}
-        self.equals = {normal(text): f"{normal(text)} = {normal(other)}" for text, other in equals.items()}
-        self.labels = {text: what for what, texts in said.items() for text in texts if text.startswith("eq-")}
-        self.indices = {key for (first, *_) in self.worlds for key, value in first.items() if isinstance(value, range)}
+        self.equals = {
+            normal(text): f"{normal(text)} = {normal(other)}" for text, other in equals.items()
+        }
+        self.labels = {
+            text: what for what, texts in said.items() for text in texts if text.startswith("eq-")
+        }
+        self.indices = {
+            key
+            for (first, *_) in self.worlds
+            for key, value in first.items()
+            if isinstance(value, range)
+        }
 
     @property
     def listed(self) -> list[str]:
         """What a page must have, as its file speaks of it."""
-        return [*(text for text in self.said if text not in map(normal, self.labels)), *self.labels, *self.equals.values()]
+        return [
+            *(text for text in self.said if text not in map(normal, self.labels)),
+            *self.labels,
+            *self.equals.values(),
+        ]
 
     def judge(self, formula: Formula, elsewhere: str = "") -> list[Said]:
-        """What each relation of a formula is; a key point may say what stands elsewhere on the page.
+        """What each relation of a formula is; a key point may say what stands elsewhere on the
+        page.
 
         Raises
         ------
@@ -113,10 +137,18 @@ class Letters:
             return [self._judged(self.equals[whole], formula)]
         if formula.kind in ("side", "name"):
             raise Unverified(
-                _unsaid(formula.latex, "it is printed beside a checked equation, and nothing holds it; EQUALS or SAID may")
+                _unsaid(
+                    formula.latex,
+                    "it is printed beside a checked equation, and nothing holds it; EQUALS or "
+                    "SAID may",
+                )
             )
         if formula.kind == "point":
-            new = [piece for piece in pieces(formula.latex) if not re.search(rf" {re.escape(piece)} (?![\^_'])", elsewhere)]
+            new = [
+                piece
+                for piece in pieces(formula.latex)
+                if not re.search(rf" {re.escape(piece)} (?![\^_'])", elsewhere)
+            ]
             return [self._judged(self.equals.get(piece, piece), formula) for piece in new]
         if formula.kind == "sentence":
             return [said for piece in self.related(formula) for said in self.read(piece)]
@@ -130,7 +162,9 @@ class Letters:
     def says(self, piece: str) -> bool:
         """Is there anything in it that can be wrong?  Not where an index begins."""
         left, _, right = piece.partition(" = ")
-        return speaks(piece) and not (left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right))
+        return speaks(piece) and not (
+            left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right)
+        )
 
     def _judged(self, piece: str, formula: Formula) -> Said:
         if piece in self.said:
@@ -148,7 +182,7 @@ class Letters:
             return [Said(piece, self.said[piece], False)]
         return [Said(piece, COMPUTED, True)] if self._against(piece) is None else []
 
-    @cache  # noqa: B019 (the letters of a page are kept)
+    @cache  # noqa: B019
     def _against(self, piece: str) -> str | None:
         """None if a relation holds in a world of the page; why, if none can read it.
 
@@ -172,11 +206,15 @@ class Letters:
 
 
 def speaks(piece: str) -> bool:
-    """Does this piece say anything: a relation, a sum, a product, a power of several letters?  A name alone does not."""
+    """Does this piece say anything: a relation, a sum, a product, a power of several letters?  A
+    name alone does not."""
     if is_relation(piece):
         return True
     letters = _without_scripts(piece)
-    return bool(_OPERATOR.search(f" {letters}")) and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
+    return (
+        bool(_OPERATOR.search(f" {letters}"))
+        and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
+    )
 
 
 def _sets(piece: str) -> bool:
@@ -184,7 +222,9 @@ def _sets(piece: str) -> bool:
     plain = _NO_LETTER.sub("", _without_scripts(piece)).split()
     sides = [list(side) for related, side in groupby(plain, RELATIONS.__contains__) if not related]
     return all(
-        len(side) == 1 or (side[0] == "-" and len(side) == 2) or not any(one.strip("\\").isalpha() for one in side)
+        len(side) == 1
+        or (side[0] == "-" and len(side) == 2)
+        or not any(one.strip("\\").isalpha() for one in side)
         for side in sides
     )
 
@@ -222,12 +262,16 @@ def letters_of(page: Path) -> Letters:
 
 
 def formulas(text: str) -> Iterator[Formula]:
-    """The formulas of a page that no expression of SymPy prints: displays, boxes, strings in `verified` and `typeset`."""
+    """The formulas of a page that no expression of SymPy prints: displays, boxes, strings in
+    `verified` and `typeset`."""
     prose = _CELL.sub("", text)
     before, dollars, after = _DISPLAY.sub("", prose).partition("$$")
     if dollars:
         there = f"{before[-20:]}$${after[:20]}".strip()
-        raise Unverified(f"a display stands on lines of its own, with $$ at the beginning of the lines around it: {there!r}")
+        raise Unverified(
+            f"a display stands on lines of its own, with $$ at the beginning of the lines around "
+            f"it: {there!r}"
+        )
     for latex, label in _DISPLAY.findall(prose):
         yield Formula("display", latex, label)
     for *_, body in _BOX.findall(prose):
@@ -249,7 +293,10 @@ def cells(text: str) -> Iterator[str]:
 def calls(code: str, *names: str) -> Iterator[ast.Call]:
     """The calls of these functions in a piece of Python."""
     for node in ast.walk(ast.parse(code)):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", "")) in names:
+        if (
+            isinstance(node, ast.Call)
+            and getattr(node.func, "id", getattr(node.func, "attr", "")) in names
+        ):
             yield node
 
 
@@ -262,12 +309,20 @@ def _printed(code: str) -> Iterator[Formula]:
                 yield from (Formula("name", text) for text in _texts(keyword.value.values))
     for call in calls(code, "Symbol", "MatrixSymbol", "symbols"):
         several = getattr(call.func, "attr", getattr(call.func, "id", "")) == "symbols"
-        names = [name for text in _texts(call.args[:1]) for name in (text.split() if several else [text])]
-        yield from (Formula("name", name) for name in dict.fromkeys(names) if re.search(r"[\\{]", name) and speaks(normal(name)))
+        names = [
+            name for text in _texts(call.args[:1]) for name in (text.split() if several else [text])
+        ]
+        yield from (
+            Formula("name", name)
+            for name in dict.fromkeys(names)
+            if re.search(r"[\\{]", name) and speaks(normal(name))
+        )
 
 
 def _texts(nodes: Iterable[ast.expr]) -> list[str]:
-    return [one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    return [
+        one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)
+    ]
 
 
 def typed_numbers(text: str) -> Iterator[str]:
@@ -277,15 +332,34 @@ def typed_numbers(text: str) -> Iterator[str]:
     what a formula or a name (variant 53) says is no number.
     """
     for code in cells(text):
-        captions = [word.value for call in calls(code, "table") for word in call.keywords if word.arg == "caption"]
+        captions = [
+            word.value
+            for call in calls(code, "table")
+            for word in call.keywords
+            if word.arg == "caption"
+        ]
         sentences = [*captions, *(call.args[0] for call in calls(code, "claim", "agree"))]
         typed = {_place(node) for sentence in sentences for node in ast.walk(sentence)}
         constants = [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Constant)]
-        known = [node.value for node in constants if isinstance(node.value, int | float) and _place(node) not in typed]
-        for number in _NUMBER.findall(_NO_NUMBER.sub(" ", "…".join(text for sentence in sentences for text in _typed(sentence)))):
+        known = [
+            node.value
+            for node in constants
+            if isinstance(node.value, int | float) and _place(node) not in typed
+        ]
+        for number in _NUMBER.findall(
+            _NO_NUMBER.sub(
+                " ", "…".join(text for sentence in sentences for text in _typed(sentence))
+            )
+        ):
             value = float(number.replace(",", ""))
-            backing = [value, *([10.0**-value] if value < 300 else []), *([value / 100, 1 - value / 100] if value % 100 else [])]
-            if not any(np.isclose(one, abs(other), rtol=1e-9, atol=0) for one in backing for other in known):
+            backing = [
+                value,
+                *([10.0**-value] if value < 300 else []),
+                *([value / 100, 1 - value / 100] if value % 100 else []),
+            ]
+            if not any(
+                np.isclose(one, abs(other), rtol=1e-9, atol=0) for one in backing for other in known
+            ):
                 yield number
 
 
@@ -295,14 +369,24 @@ def _place(node: ast.AST) -> tuple[int, int]:
 
 def _typed(sentence: ast.expr) -> Iterator[str]:
     """The texts of a sentence without what is put in."""
-    values = {id(node) for field in ast.walk(sentence) if isinstance(field, ast.FormattedValue) for node in ast.walk(field)}
+    values = {
+        id(node)
+        for field in ast.walk(sentence)
+        if isinstance(field, ast.FormattedValue)
+        for node in ast.walk(field)
+    }
     for node in ast.walk(sentence):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in values:
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and id(node) not in values
+        ):
             yield node.value
 
 
 def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[Said]]]:
-    """The formulas of a page, each with what its relations are; another text may take the place of the page's."""
+    """The formulas of a page, each with what its relations are; another text may take the place of
+    the page's."""
     letters = letters_of(page)
     text = page.read_text(encoding="utf-8") if text is None else text
     elsewhere = outside_points(text)
@@ -311,7 +395,8 @@ def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[
 
 
 def outside_points(text: str) -> str:
-    """All formulas of a page but those of its key points, one after the other, as `normal` writes them."""
+    """All formulas of a page but those of its key points, one after the other, as `normal` writes
+    them."""
     text = _POINTS.sub("", text)
     typed = [latex for latex, _ in _DISPLAY.findall(text)] + _INLINE.findall(_DISPLAY.sub("", text))
     return "|".join(f" {normal(latex)} " for latex in typed)

@@ -1,13 +1,16 @@
 r"""Plants changes in the relations that the book displays, and counts what nothing notices.
 
     cd book
-    python -m gate.plant                each typed relation of each page, changed in each way it can be: by chapter and kind
+    python -m gate.plant
+        each typed relation of each page, changed in each way it can be: by chapter and kind
     python -m gate.plant --seed 7       other places of the changes
-    python -m gate.plant --checked 20   and changes in 20 checked expressions, for which cells are executed
+    python -m gate.plant --checked 20
+        and changes in 20 checked expressions, for which cells are executed
     python -m gate.plant grid --show    one chapter, and each change that nothing noticed
 
-A change is a sign, a factor, an index, or a transposition.  It is noticed if the relation no longer holds, or is no longer what
-the page's file in book/letters/ says (gate.page).  More than 5 % unnoticed is a failure.
+A change is a sign, a factor, an index, or a transposition.  It is noticed if the relation no longer
+holds, or is no longer what the page's file in book/letters/ says (gate.page).  More than 5 %
+unnoticed is a failure.
 """
 
 from __future__ import annotations
@@ -54,9 +57,12 @@ def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Pl
     places = [
         (formula, piece)
         for formula in formulas(text)
-        for piece in ([normal(formula.latex)] if formula.kind in ("side", "name") else pieces(formula.latex))
+        for piece in (
+            [normal(formula.latex)] if formula.kind in ("side", "name") else pieces(formula.latex)
+        )
         if formula.kind in ("side", "name") or letters.says(piece)
-        if formula.kind != "sentence" or letters.judge(formula._replace(latex=piece))  # what cannot be read is not held
+        # what cannot be read is not held
+        if formula.kind != "sentence" or letters.judge(formula._replace(latex=piece))
     ]
     for formula, piece in chance.sample(places, min(most, len(places))):
         letters.judge(formula, elsewhere)  # what does not hold before notices everything
@@ -80,7 +86,8 @@ def noticed(letters: Letters, formula: Formula, elsewhere: str = "") -> bool:
 
 
 def in_cells(page: Path, chance: random.Random) -> Planted | None:
-    """A sign or a factor changed in a checked expression of a page, whose cells are executed up to there."""
+    """A sign or a factor changed in a checked expression of a page, whose cells are executed up to
+    there."""
     text = page.read_text(encoding="utf-8")
     places = [
         (code, node)
@@ -97,15 +104,22 @@ def in_cells(page: Path, chance: random.Random) -> Planted | None:
     kind = "factor" if isinstance(node, ast.Constant) else "sign"
     after = f"(-({before}))" if kind == "sign" else str(node.value + 1)
     lines = code.splitlines(keepends=True)
-    start = sum(map(len, lines[: node.lineno - 1])) + len(lines[node.lineno - 1].encode()[: node.col_offset].decode())
+    start = sum(map(len, lines[: node.lineno - 1])) + len(
+        lines[node.lineno - 1].encode()[: node.col_offset].decode()
+    )
     changed = code[:start] + after + code[start + len(before) :]
-    return Planted(page.stem, "checked", kind, before, after, stops(text.replace(code, changed), changed))
+    return Planted(
+        page.stem, "checked", kind, before, after, stops(text.replace(code, changed), changed)
+    )
 
 
 def _changeable(node: ast.AST) -> bool:
-    """A product or a sum, or a whole number in one; not an index, which ast shows inside a Subscript."""
+    """A product or a sum, or a whole number in one; not an index, which ast shows inside a
+    Subscript."""
     number = isinstance(node, ast.Constant) and type(node.value) is int and node.value > 1
-    return number or (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div))
+    return number or (
+        isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
+    )
 
 
 def stops(chapter: str, changed: str) -> bool:
@@ -120,14 +134,21 @@ def stops(chapter: str, changed: str) -> bool:
 
 
 def run(chapter: str, changed: str, alone: bool) -> None:
-    """Execute the code of a chapter, without what only its figures need, to the cell after the change."""
+    """Execute the code of a chapter, without what only its figures need, to the cell after the
+    change."""
     names: dict[str, Any] = {}
     left: list[str] = []  # cells of figures
-    code = [cell for cell in jupytext.reads(chapter, fmt="md:myst").cells if cell.cell_type == "code"]
+    code = [
+        cell for cell in jupytext.reads(chapter, fmt="md:myst").cells if cell.cell_type == "code"
+    ]
     place = next(i for i, cell in enumerate(code) if changed.strip() in cell.source)
     for i, cell in enumerate(code[: place + 2]):
         if alone and i < place:
-            imports = [node for node in ast.parse(cell.source).body if isinstance(node, ast.Import | ast.ImportFrom)]
+            imports = [
+                node
+                for node in ast.parse(cell.source).body
+                if isinstance(node, ast.Import | ast.ImportFrom)
+            ]
             exec(compile(ast.Module(imports, []), "imports", "exec"), names)
         elif "figure" in cell.metadata.get("mystnb", {}) and "import" not in cell.source:
             left.append(cell.source)
@@ -141,7 +162,8 @@ def run(chapter: str, changed: str, alone: bool) -> None:
 
 
 def change(piece: str, kind: str, chance: random.Random) -> str | None:
-    """A relation with one sign, factor, index or transposition changed; None if there is no place for it."""
+    """A relation with one sign, factor, index or transposition changed; None if there is no place
+    for it."""
     text = piece.split()
     inside = list(_scripts(text))
     ways: list[tuple[int, int, list[str]]] = []  # from, to, what takes the place
@@ -152,7 +174,13 @@ def change(piece: str, kind: str, chance: random.Random) -> str | None:
             ways.append((i, i + 1, [str(int(one) % 9 + 1)]))
         if kind == "index" and i and text[i - 1] == "_" and re.fullmatch(r"[a-z]", one):
             ways.append((i, i + 1, ["{", one, "+", "1", "}"]))
-        if kind == "index" and inside[i] and one in "+-" and i + 1 < len(text) and text[i + 1].isdigit():
+        if (
+            kind == "index"
+            and inside[i]
+            and one in "+-"
+            and i + 1 < len(text)
+            and text[i + 1].isdigit()
+        ):
             ways.append((i, i + 2, []) if text[i - 1] != "{" else (i, i, []))
         if kind == "transposition" and i and text[i - 1] == "^" and one == "T":
             ways.append((i - 1, i + 1, []))
@@ -182,15 +210,25 @@ def _scripts(text: list[str]) -> Iterator[bool]:
 
 def report(found: list[Planted]) -> str:
     """Planted and unnoticed changes, by chapter and kind of display: a table."""
-    columns = [(where, kind) for where in ("display", "box", "point", "sentence", "side", "name", "checked") for kind in KINDS]
+    columns = [
+        (where, kind)
+        for where in ("display", "box", "point", "sentence", "side", "name", "checked")
+        for kind in KINDS
+    ]
     columns = [one for one in columns if any((row.where, row.kind) == one for row in found)]
     wheres = list(dict.fromkeys(where for where, _ in columns))
-    lines = [f"{'unnoticed of planted':24}" + "".join(f"{where:>12}" for where in wheres) + f"{'all':>12}"]
+    lines = [
+        f"{'unnoticed of planted':24}"
+        + "".join(f"{where:>12}" for where in wheres)
+        + f"{'all':>12}"
+    ]
     for page in [*dict.fromkeys(row.page for row in found), "all chapters"]:
         rows = [row for row in found if page in (row.page, "all chapters")]
         lines.append(
             f"{page:24}"
-            + "".join(f"{_share([row for row in rows if row.where == where]):>12}" for where in wheres)
+            + "".join(
+                f"{_share([row for row in rows if row.where == where]):>12}" for where in wheres
+            )
             + f"{_share(rows):>12}"
         )
     by_kind = Counter(row.kind for row in found)
@@ -204,10 +242,14 @@ def _share(rows: list[Planted]) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seed", type=int, default=53)
     parser.add_argument("--checked", type=int, default=0)
-    parser.add_argument("--show", action="store_true", help="print each change that nothing noticed")
+    parser.add_argument(
+        "--show", action="store_true", help="print each change that nothing noticed"
+    )
     parser.add_argument("pages", nargs="*", help="chapters, all without")
     given = parser.parse_args()
     chance = random.Random(given.seed)

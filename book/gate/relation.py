@@ -4,12 +4,12 @@ r"""Reads a relation as it is printed, in LaTeX, and computes its sides while it
 
     holds(r"p_k=(I-K_kH)\Psi_k", {"p": Indexed(p), ..., "H": H, "I": I, "k": range(1, 4)})
 
-The letters are numbers: floats, matrices (n, m) (a column is (n, 1)), functions, `Indexed` values, a
-`range` for an index that runs, `Of` for what depends on an index or on a variable of integration.  A
-letter may be any piece of LaTeX (`p(x_k\mid y_{0:k})`): the longest that fits is taken.  Read are
+The letters are numbers: floats, matrices (n, m) (a column is (n, 1)), functions, `Indexed` values,
+a `range` for an index that runs, `Of` for what depends on an index or on a variable of integration.
+A letter may be any piece of LaTeX (`p(x_k\mid y_{0:k})`): the longest that fits is taken.  Read are
 + - / products and powers, ^T and ^{-1}, functions, \frac, \sqrt, |x|, matrices, \sum, \prod and
-\int, and the relations = \approx \le \ge < > \propto \leftarrow.  What is written z\leftarrow on the
-left is the letter `z\leftarrow`, the new value.
+\int, and the relations = \approx \le \ge < > \propto \leftarrow.  What is written z\leftarrow on
+the left is the letter `z\leftarrow`, the new value.
 """
 
 from __future__ import annotations
@@ -79,25 +79,32 @@ class Key(NamedTuple):
 
 
 def keys_of(letters: Letters) -> list[Key]:
-    """The letters, the longest first, and below them the functions and numbers that all pages know."""
+    """The letters, the longest first, and below them the functions and numbers that all pages
+    know."""
     own = [Key(normal(name).split(), name, value) for name, value in letters.items()]
     known = [Key(normal(name).split(), name, value) for name, value in FUNCTIONS.items()]
-    return sorted(own, key=lambda key: -len(key.words)) + [key for key in known if key.name not in letters]
+    return sorted(own, key=lambda key: -len(key.words)) + [
+        key for key in known if key.name not in letters
+    ]
 
 
 class Reader:
     """A parser by recursive descent: each method reads a part of the text and returns its value.
 
-    What cannot be computed is NaN, and the first reason `failed`: the rest is read all the same, as a
-    letter without a value weighs more than a shape that does not fit.
+    What cannot be computed is NaN, and the first reason `failed`: the rest is read all the same, as
+    a letter without a value weighs more than a shape that does not fit.
     """
 
-    def __init__(self, text: list[str], keys: list[Key], at: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, text: list[str], keys: list[Key], at: Mapping[str, Any] | None = None
+    ) -> None:
         self.text, self.keys, self.at, self.place = text, keys, dict(at or {}), 0
         self.bound: tuple[str, ...] = ()  # variables of the integrals around
-        self.ends: tuple[str, ...] = ()  # the variable whose d ends what is read, "" inside a bracket
+        # the variable whose d ends what is read, "" inside a bracket
+        self.ends: tuple[str, ...] = ()
         self.summed: tuple[str, ...] = ()  # indices of the sums around that name none
-        self.bars: tuple[str, ...] = ()  # what is open: a "group", "arguments", a "value" between bars
+        # what is open: a "group", "arguments", a "value" between bars
+        self.bars: tuple[str, ...] = ()
         self.braced: list[tuple[Value, Value]] = []
         self.failed: Exception | None = None
 
@@ -144,9 +151,14 @@ class Reader:
             signs.append(self.take())
             sides.append(self.total())
         if self.next or not signs:
-            raise Unread(f"cannot read {' '.join(self.text[self.place :]) or 'as a relation'} in {' '.join(self.text)}")
+            raise Unread(
+                f"cannot read {' '.join(self.text[self.place :]) or 'as a relation'} in "
+                f"{' '.join(self.text)}"
+            )
         if self.failed:
-            raise Unverified(f"cannot be computed, {self.failed}: {' '.join(self.text)}") from self.failed
+            raise Unverified(
+                f"cannot be computed, {self.failed}: {' '.join(self.text)}"
+            ) from self.failed
         return sides, signs, self.braced
 
     def total(self) -> Value:
@@ -175,7 +187,12 @@ class Reader:
         token = self.next
         if token == "|":  # opens, unless it closes or separates arguments
             return self.bars[-1:] in ((), ("group",))
-        if not token or token in RELATIONS or token in CLOSE or token in {"}", "+", "-", ",", ";", "&", r"\\", r"\end"}:
+        if (
+            not token
+            or token in RELATIONS
+            or token in CLOSE
+            or token in {"}", "+", "-", ",", ";", "&", r"\\", r"\end"}
+        ):
             return False
         variable = self.ends[-1].split() if self.ends else []
         return not (token == "d" and variable and self._follows(["d", *variable]))
@@ -185,7 +202,11 @@ class Reader:
         value = self.atom()
         if bracketed and self.next == "_":  # a column of a matrix, counted from one
             self.take()
-            value = self.compute(lambda matrix, number: matrix[:, [whole(number) - 1]], value, self._inside(self._group()))
+            value = self.compute(
+                lambda matrix, number: matrix[:, [whole(number) - 1]],
+                value,
+                self._inside(self._group()),
+            )
         while self.next == "^":
             self.take()
             value = self._power(value, self._group())
@@ -212,7 +233,8 @@ class Reader:
 
     @contextmanager
     def _within(self, bracket: str) -> Iterator[None]:
-        """Inside a bracket a d is no differential of the integral around, and a bar closes or separates."""
+        """Inside a bracket a d is no differential of the integral around, and a bar closes or
+        separates."""
         before = self.ends, self.bars
         self.ends, self.bars = (*self.ends, ""), (*self.bars, bracket)
         yield
@@ -333,7 +355,9 @@ class Reader:
 
     def _applied(self, function: Callable[..., Any]) -> Value:
         power: list[str] = []
-        if self.next == "^" and (self._after(1) not in ("T", "{") or (self._after(1) == "T" and self._after(2) == "(")):
+        if self.next == "^" and (
+            self._after(1) not in ("T", "{") or (self._after(1) == "T" and self._after(2) == "(")
+        ):
             self.take()
             power = self._group()
         if self.next in ("(", "["):
@@ -439,7 +463,8 @@ class Reader:
         return self.compute(lambda: (b - a) / 2 * float(np.sum(WEIGHTS * body)))
 
     def _variable(self) -> str:
-        """The variable of the integral that begins here: what follows the next d outside of brackets."""
+        """The variable of the integral that begins here: what follows the next d outside of
+        brackets."""
         depth = 0
         for place in range(self.place, len(self.text) - 1):
             token = self.text[place]

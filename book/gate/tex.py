@@ -1,4 +1,5 @@
-r"""Formulas in LaTeX as tokens: what TeX prints alike is alike here, and a display falls into its relations."""
+r"""Formulas in LaTeX as tokens: what TeX prints alike is alike here, and a display falls into its
+relations."""
 
 from __future__ import annotations
 
@@ -7,8 +8,23 @@ import re
 RELATIONS = {"=", r"\approx", r"\le", r"\ge", "<", ">", r"\propto", r"\leftarrow"}
 _OTHERS = {r"\sim", r"\ll", r"\gg", r"\to", r"\in", r"\ne", r"\gtrsim", r"\lesssim"}  # not computed
 _TOKEN = re.compile(r"\\[a-zA-Z]+|\\.|[^\s]", re.DOTALL)
-_SPACE = {r"\,", r"\;", r"\!", r"\:", r"\ ", "~", r"\displaystyle", r"\textstyle", r"\nonumber", r"\left", r"\right", r"\middle"}
-_SPACE |= {rf"\{size}{side}" for size in ("big", "Big", "bigg", "Bigg") for side in ("", "l", "r", "m")}
+_SPACE = {
+    r"\,",
+    r"\;",
+    r"\!",
+    r"\:",
+    r"\ ",
+    "~",
+    r"\displaystyle",
+    r"\textstyle",
+    r"\nonumber",
+    r"\left",
+    r"\right",
+    r"\middle",
+}
+_SPACE |= {
+    rf"\{size}{side}" for size in ("big", "Big", "bigg", "Bigg") for side in ("", "l", "r", "m")
+}
 _SAME = {
     r"\dfrac": r"\frac",
     r"\tfrac": r"\frac",
@@ -27,7 +43,9 @@ def tokens(latex: str) -> list[str]:
     latex = re.sub(r"\\(begin|end)\{(aligned|gathered|gathered|split)\}", " ", latex)
     latex = re.sub(r"\\\\\[[^\]]*\]", r"\\\\", latex)
     latex = re.sub(
-        r"\\text(rm)?\{([^{}$]|\$[^$]*\$)*\}", lambda word: word[0] if _scripted(latex, word.start()) else r" \qquad ", latex
+        r"\\text(rm)?\{([^{}$]|\$[^$]*\$)*\}",
+        lambda word: word[0] if _scripted(latex, word.start()) else r" \qquad ",
+        latex,
     )
     found = [_SAME.get(one, one) for one in _TOKEN.findall(latex) if one not in _SPACE]
     inside, kept = 0, []
@@ -51,7 +69,8 @@ def normal(latex: str) -> str:
 
 
 def pieces(latex: str) -> list[str]:
-    """The pieces of a formula that commas, spaces and lines separate, each without the mark that ends it."""
+    """The pieces of a formula that commas, spaces and lines separate, each without the mark that
+    ends it."""
     found: list[list[str]] = [[]]
     depth = 0
     for one in normal(latex).split():

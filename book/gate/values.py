@@ -1,7 +1,7 @@
 """What the letters of a relation stand for, and how values add and multiply.
 
-A matrix is (n, m), a column (n, 1); products keep their order and shapes must fit, so that a missing
-transposition is found.
+A matrix is (n, m), a column (n, 1); products keep their order and shapes must fit, so that a
+missing transposition is found.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class Indexed:
 
 
 class Of:
-    """What depends on letters that an index or an integral moves: `Of(density, "x_k", "x_{k-1}")`."""
+    """What depends on letters that an index or an integral moves:
+    `Of(density, "x_k", "x_{k-1}")`."""
 
     def __init__(self, function: Callable[..., Any], *letters: str) -> None:
         self.function, self.letters = function, letters

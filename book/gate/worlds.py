@@ -1,21 +1,24 @@
-r"""Numbers for the letters of a page: definitions in LaTeX, read by the reader that reads the page, and shared runs.
+r"""Numbers for the letters of a page: definitions in LaTeX, read by the reader that reads the page,
+and shared runs.
 
 A world is a text whose lines are done one after another::
 
     \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num,
                                        nums n [plain], share n (they sum to one), list n any m
     k: range 0 4                       an index that runs
-    x: nodes \lambda \Psi              nodes of a normal law, and the operators \mathsf M and \mathsf D over it
+    x: nodes \lambda \Psi   nodes of a normal law, and the operators \mathsf M and \mathsf D over it
     K = \Psi G^T(G\Psi G^T+R)^{-1}      define, of letters that stand above
     f(x) = \sin x                      define a function
-    \Psi_{k+1} = Ap_kA^T+Q             lines with an index follow each other for k = 0, 1, ...; \Psi_0 = P begins
+    \Psi_{k+1} = Ap_kA^T+Q
+        lines with an index follow each other for k = 0, 1, ...; \Psi_0 = P begins
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
-    again:                             what follows, down to `then:`, again and again until nothing changes
+    again:   what follows, down to `then:`, again and again until nothing changes
     keep: K, p                         forget all other letters; `forget: a, b` these
-    "|v|" = \sqrt{v^Tv}                a letter that looks like something else; `"p(x|z)" of x = ...` moves with x
+    "|v|" = \sqrt{v^Tv}
+        a letter that looks like something else; `"p(x|z)" of x = ...` moves with x
 
-A page's relation must hold in a world with all its letters, so a world says things in another way than the page: an inverse for a
-gain, a sum or an integral for a closed form.
+A page's relation must hold in a world with all its letters, so a world says things in another way
+than the page: an inverse for a gain, a sum or an integral for a closed form.
 """
 
 from __future__ import annotations
@@ -45,7 +48,9 @@ AGAIN = 5000  # rounds of what comes to rest; those of the pages take some hundr
 
 def world(text: str) -> Callable[[np.random.Generator], dict[str, Any]]:
     """The letters of a text of definitions, drawn with a generator."""
-    lines = [line for line in (line.partition("#")[0].strip() for line in text.splitlines()) if line]
+    lines = [
+        line for line in (line.partition("#")[0].strip() for line in text.splitlines()) if line
+    ]
 
     stepped = {line.partition("_{k+1}")[0] for line in lines if "_{k+1}" in line.partition("=")[0]}
 
@@ -84,9 +89,13 @@ def _kind(line: str, stepped: set[str]) -> str:
     return "step" if re.search(r"_(k|\{k\+1\})$", left.strip()) else "once"
 
 
-def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: str) -> dict[str, Any]:
+def _drawn(
+    letters: dict[str, Any], rng: np.random.Generator, names: str, what: str
+) -> dict[str, Any]:
     if names == "forget":
-        return {name: value for name, value in letters.items() if name not in what.strip().split(", ")}
+        return {
+            name: value for name, value in letters.items() if name not in what.strip().split(", ")
+        }
     if names == "keep":
         return {name: letters[name] for name in what.strip().split(", ")}
     kind, *words = what.split()
@@ -97,7 +106,8 @@ def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: 
     if kind == "list":
         count, *each = words
         return letters | {
-            name: Indexed([_drawn({}, rng, "", " ".join(each))[""] for _ in range(int(count))]) for name in names.split(", ")
+            name: Indexed([_drawn({}, rng, "", " ".join(each))[""] for _ in range(int(count))])
+            for name in names.split(", ")
         }
     draw = {
         "any": lambda *sizes: rng.normal(size=[int(size) for size in (*sizes, 1)[:2]]),
@@ -105,10 +115,14 @@ def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: 
         "eye": lambda size: np.eye(int(size)),
         "in": lambda low, high: rng.uniform(float(low), float(high)),
         "num": rng.normal,
-        "nums": lambda size, *plain: Indexed(rng.normal(size=int(size)), rng.normal() if plain else None),
+        "nums": lambda size, *plain: Indexed(
+            rng.normal(size=int(size)), rng.normal() if plain else None
+        ),
         "pos": lambda: rng.uniform(0.5, 2),
         "range": lambda *ends: range(*map(int, ends)),
-        "share": lambda *sizes: Indexed(rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])),
+        "share": lambda *sizes: Indexed(
+            rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])
+        ),
     }[kind]
     return letters | {name: draw(*words) for name in names.split(", ")}
 
@@ -130,7 +144,9 @@ def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
             made = _made(*line.split("=", 1), letters)
             letters |= made
             values += [np.array(value) for value in made.values() if not callable(value)]
-        if before and all(np.allclose(*pair, rtol=1e-14, atol=1e-300) for pair in zip(values, before, strict=True)):
+        if before and all(
+            np.allclose(*pair, rtol=1e-14, atol=1e-300) for pair in zip(values, before, strict=True)
+        ):
             return
         before = values
 
@@ -146,8 +162,15 @@ def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
         running = [isinstance(own.get(each), range) for each in names]
 
         def function(*given: Any) -> Any:
-            at = {each: value for each, value, runs in zip(names, given, running, strict=True) if runs}
-            return _computed(right, own | {each: value for each, value in zip(names, given, strict=True) if each not in at}, at)
+            at = {
+                each: value for each, value, runs in zip(names, given, running, strict=True) if runs
+            }
+            return _computed(
+                right,
+                own
+                | {each: value for each, value in zip(names, given, strict=True) if each not in at},
+                at,
+            )
 
         return {name: Of(function, *names)}
     indices = re.fullmatch(r"(.+)_(?:\{(\w+)\}|(\w))", left)
@@ -159,7 +182,11 @@ def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
     if not (call := re.fullmatch(r"(.+?)\(([^()]*)\)", left)):
         return {left: _computed(right, letters, {})}
     arguments = [name.strip() for name in call[2].split(",")]
-    return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments[: len(given)], given, strict=True)), {})}
+    return {
+        call[1]: lambda *given: _computed(
+            right, own | dict(zip(arguments[: len(given)], given, strict=True)), {}
+        )
+    }
 
 
 def _computed(text: str, letters: Mapping[str, Any], at: Mapping[str, Any]) -> Any:
@@ -186,7 +213,8 @@ def column(values: Any) -> np.ndarray:
 
 
 def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
-    r"""The letters A, H, Q, R, I and \\lambda, \\Psi, K, z, p, \\nu, F, y with the index k, from `kfcourse.filters.kalman`.
+    r"""The letters A, H, Q, R, I and \\lambda, \\Psi, K, z, p, \\nu, F, y with the index k, from
+    `kfcourse.filters.kalman`.
 
     K is p H^T R^{-1}, the form of the gain that the package does not compute with.
     """
@@ -195,11 +223,21 @@ def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     Q, R = covariance(rng, states), covariance(rng, seen)
     system = LinearSystem(A, H, Q, R)
     law = Gaussian(rng.normal(size=states), covariance(rng, states))
-    found: dict[str, list[Any]] = {name: [] for name in (r"\lambda", r"\Psi", "y", "K", "z", "p", r"\nu", "F")}
+    found: dict[str, list[Any]] = {
+        name: [] for name in (r"\lambda", r"\Psi", "y", "K", "z", "p", r"\nu", "F")
+    }
     for _ in range(_STEPS):
         y = rng.normal(size=seen)
         posterior = correct(system, law, y)
-        row = (law.mean, law.cov, y, posterior.cov @ H.T @ np.linalg.inv(R), posterior.mean, posterior.cov, y - H @ law.mean)
+        row = (
+            law.mean,
+            law.cov,
+            y,
+            posterior.cov @ H.T @ np.linalg.inv(R),
+            posterior.mean,
+            posterior.cov,
+            y - H @ law.mean,
+        )
         for name, value in zip(found, (*row, H @ law.cov @ H.T + R), strict=True):
             found[name].append(column(value) if np.ndim(value) == 1 else value)
         law = predict(system, posterior)
@@ -223,7 +261,10 @@ def _bent(turn: str, mixed: str) -> Model:
 
 def _bent_scalar(turn: str, mixed: str) -> Model:
     return Model.define(
-        f"0.8*x + {turn}*sin(x) + (0.4 + 0.1*x)*v", f"x + {mixed}*x**2 + 0.5*w", {}, prior={"mean": 0.5, "variance": 0.4}
+        f"0.8*x + {turn}*sin(x) + (0.4 + 0.1*x)*v",
+        f"x + {mixed}*x**2 + 0.5*w",
+        {},
+        prior={"mean": 0.5, "variance": 0.4},
     )
 
 
@@ -233,10 +274,11 @@ BENT_LATER, BENT_SCALAR_LATER = _bent("0.1*k", "0.1*k"), _bent_scalar("0.1*k", "
 
 
 def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any]:
-    r"""The letters of the extended Kalman filter of a model: f, g, S, \\Phi, H, D_\\xi, D_n, I and, with k, those of its run.
+    r"""The letters of the extended Kalman filter of a model: f, g, S, \\Phi, H, D_\\xi, D_n, I and,
+    with k, those of its run.
 
-    The run is `aof(linearised(model))`, the Jacobians are derivatives by complex steps, K = p H^T D_n^{-1}.  The noises of the
-    object are mixed, so that D_\\xi is not the identity.
+    The run is `aof(linearised(model))`, the Jacobians are derivatives by complex steps, K = p H^T
+    D_n^{-1}.  The noises of the object are mixed, so that D_\\xi is not the identity.
     """
     quiet = dict.fromkeys([*model.v, *model.w], 0)
     move, see = sp.Matrix(model.state_equation), sp.Matrix(model.meter_equation)
@@ -257,7 +299,9 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
     D_n = np.array(see.jacobian(model.w) * see.jacobian(model.w).T, dtype=float)
     ekf = aof(linearised(model))
     state = ekf.init(1)
-    found: dict[str, list[Any]] = {name: [] for name in (r"\lambda", r"\Psi", "y", "z", "p", "H", "K", r"\nu", r"\Phi", "g")}
+    found: dict[str, list[Any]] = {
+        name: [] for name in (r"\lambda", r"\Psi", "y", "z", "p", "H", "K", r"\nu", r"\Phi", "g")
+    }
     for k, y in enumerate(simulate(model, runs=1, steps=_STEPS, seed=int(rng.integers(1 << 30))).y):
         law, state = state.predicted, ekf.step(state, y)
         (lam, Psi), (z, p) = (_only(law), _only(state.posterior))
@@ -282,19 +326,22 @@ def slope(function: Callable[[Any], np.ndarray], x: np.ndarray) -> np.ndarray:
 
 
 def given(before: Indexed, after: Indexed) -> Indexed:
-    r"""A letter with two indices, as Western books write it: `P_{k|k-1}` is a prediction, `P_{k|k}` an estimate."""
+    r"""A letter with two indices, as Western books write it: `P_{k|k-1}` is a prediction, `P_{k|k}`
+    an estimate."""
     return Indexed(lambda at, until: (after if at == until else before)[at,])
 
 
 def normal_nodes(mean: float, variance: float) -> tuple[np.ndarray, Callable[[Any], float]]:
-    r"""Nodes x for a normal law, and the mean of a function of x that is given at the nodes (Gauss and Hermite)."""
+    r"""Nodes x for a normal law, and the mean of a function of x that is given at the nodes (Gauss
+    and Hermite)."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     weights = weights / weights.sum()
     return mean + np.sqrt(variance) * nodes, lambda values: float(np.sum(weights * values))
 
 
 class Masses(np.ndarray):
-    r"""Masses of nodes as a row, (1, n): `\\mu_kP` is a product of matrices, `\\mu_k(j)` the mass of a node."""
+    r"""Masses of nodes as a row, (1, n): `\\mu_kP` is a product of matrices, `\\mu_k(j)` the mass
+    of a node."""
 
     @classmethod
     def of(cls, values: Any) -> Masses:
@@ -305,9 +352,14 @@ class Masses(np.ndarray):
 
 
 def chain_run(
-    rng: np.random.Generator, nodes: Any, P: np.ndarray, start: Any, likelihood: Callable[[float, Any], Any]
+    rng: np.random.Generator,
+    nodes: Any,
+    P: np.ndarray,
+    start: Any,
+    likelihood: Callable[[float, Any], Any],
 ) -> dict[str, Any]:
-    r"""The letters of the Stratonovich equation on masses, \\mu, \\mu^-, C, z, p, y with the index k, and P, x with i and j.
+    r"""The letters of the Stratonovich equation on masses, \\mu, \\mu^-, C, z, p, y with the index
+    k, and P, x with i and j.
 
     A plain program: every sum is a loop over the nodes; likelihood(y, x) is p(y | x).
     """

@@ -1,4 +1,5 @@
-"""The letters of before-measuring.md: a run of the Kalman filter; the same step with all noises scaled; a small index."""
+"""The letters of before-measuring.md: a run of the Kalman filter; the same step with all noises
+scaled; a small index."""
 
 from gate.page import NOTATION
 from gate.worlds import kalman_run

@@ -1,4 +1,5 @@
-"""The letters of better-than-a-tangent.md: moments of signals over a normal law, by quadrature and by the package."""
+"""The letters of better-than-a-tangent.md: moments of signals over a normal law, by quadrature and
+by the package."""
 
 from gate.page import DEFINITION, NOTATION
 
@@ -18,7 +19,17 @@ keep: J, \alpha, \beta, \mathsf M, S, x, m
 def corrected(h, G, F, lam, Psi, y):
     """What any correction does with h, G and F."""
     K = Psi * G / F
-    return {"h": h, "G": G, "F": F, "K": K, "z": lam + (y - h) * K, "p": Psi - K**2 * F, r"\lambda": lam, r"\Psi": Psi, "y": y}
+    return {
+        "h": h,
+        "G": G,
+        "F": F,
+        "K": K,
+        "z": lam + (y - h) * K,
+        "p": Psi - K**2 * F,
+        r"\lambda": lam,
+        r"\Psi": Psi,
+        "y": y,
+    }
 
 
 second_order = r"""

@@ -1,4 +1,5 @@
-"""The letters of between-measurements.md: a linear object, its moments by the matrix exponential and differences in time."""
+"""The letters of between-measurements.md: a linear object, its moments by the matrix exponential
+and differences in time."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -7,10 +8,13 @@ from scipy.linalg import expm
 
 
 def course(rng):
-    """A linear object after half a second, rates by differences; then a correction in information form."""
+    """A linear object after half a second, rates by differences; then a correction in information
+    form."""
     A, B, p = rng.normal(size=(2, 2)), rng.normal(size=(2, 2)), covariance(rng, 2)
     c, start, h = column(rng.normal(size=2)), column(rng.normal(size=2)), 1e-3
-    whole = np.block([[A, B @ B.T, c], [np.zeros((2, 2)), -A.T, np.zeros((2, 1))], [np.zeros((1, 5))]])
+    whole = np.block(
+        [[A, B @ B.T, c], [np.zeros((2, 2)), -A.T, np.zeros((2, 1))], [np.zeros((1, 5))]]
+    )
 
     def at(t):
         moved = expm(whole * t)
@@ -19,9 +23,24 @@ def course(rng):
 
     z, Phi, Q = at(0.5)
     ahead, after, behind, before = (at(0.5 + step * h) for step in (2, 1, -2, -1))
-    rates = [(8 * (b - c) - (a - d)) / (12 * h) for a, b, d, c in zip(ahead, after, behind, before, strict=True)]
-    names = {"A": A, "p": p, r"\Phi": Phi, "Q": Q, "I": np.eye(2), r"\mathsf MBB^T": B @ B.T, r"\mathsf Ma": A @ z + c}
-    return names | dict(zip((r"\dot z", r"\dot\Phi", r"\dot Q"), rates, strict=True)) | {r"\Psi": Phi @ p @ Phi.T + Q}
+    rates = [
+        (8 * (b - c) - (a - d)) / (12 * h)
+        for a, b, d, c in zip(ahead, after, behind, before, strict=True)
+    ]
+    names = {
+        "A": A,
+        "p": p,
+        r"\Phi": Phi,
+        "Q": Q,
+        "I": np.eye(2),
+        r"\mathsf MBB^T": B @ B.T,
+        r"\mathsf Ma": A @ z + c,
+    }
+    return (
+        names
+        | dict(zip((r"\dot z", r"\dot\Phi", r"\dot Q"), rates, strict=True))
+        | {r"\Psi": Phi @ p @ Phi.T + Q}
+    )
 
 
 correction = r"""

@@ -1,4 +1,5 @@
-"""The letters of checking-exact.md: point masses as a plain program, for a noise that enters linearly."""
+"""The letters of checking-exact.md: point masses as a plain program, for a noise that enters
+linearly."""
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
@@ -38,7 +39,8 @@ forget: c, e, v, y, X, M, l, W, w
 
 
 def bent(rng):
-    """The mean of a state whose noise grows as its square, by the trapezium rule at two small f; their errors fall as f^2."""
+    """The mean of a state whose noise grows as its square, by the trapezium rule at two small f;
+    their errors fall as f^2."""
     y = rng.uniform(1, 3)
     u = np.linspace(-12, 12, 4001)  # x - y, in standard deviations of the noise at y
 

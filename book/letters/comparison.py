@@ -1,4 +1,5 @@
-"""The letters of comparison.md: a state, its posterior mean and another estimate, with finitely many measurements."""
+"""The letters of comparison.md: a state, its posterior mean and another estimate, with finitely
+many measurements."""
 
 import numpy as np
 from gate.values import Indexed, Operator
@@ -9,7 +10,8 @@ from kfcourse.symbolic.structure import linearised
 
 
 def exact(rng):
-    """The posterior mean is the mean of the states that share a measurement; any other function of it is an estimate."""
+    """The posterior mean is the mean of the states that share a measurement; any other function of
+    it is an estimate."""
     mass, x = rng.dirichlet(np.ones(12)), rng.normal(size=12)
     seen = np.repeat(np.arange(3), 4)
     best = np.array([np.average(x[seen == one], weights=mass[seen == one]) for one in seen])
@@ -25,7 +27,8 @@ def exact(rng):
 
 
 def against_the_bound(rng):
-    """A filter off the exact one by what its measurement says; the exact one's error has two values for each."""
+    """A filter off the exact one by what its measurement says; the exact one's error has two values
+    for each."""
     mass = np.repeat(rng.dirichlet(np.ones(3)), 2) / 2
     p, delta = np.repeat(rng.uniform(0.5, 2, size=3), 2), np.repeat(rng.normal(size=3), 2)
     epsilon = np.sqrt(p) * np.tile([1, -1], 3)
@@ -33,7 +36,10 @@ def against_the_bound(rng):
     def mean(values):
         return float(mass @ values)
 
-    means = {r"\mathsf M": Operator(mean), r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2))}
+    means = {
+        r"\mathsf M": Operator(mean),
+        r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2)),
+    }
     return means | {"p": p, r"\delta": delta, r"\epsilon": epsilon, "e": epsilon + delta}
 
 

@@ -7,7 +7,8 @@ from gate.worlds import kalman_run
 
 
 def course(rng):
-    """Whitened innovations by the eigenvectors of a root: any root will do for the words, one measurement has only one."""
+    """Whitened innovations by the eigenvectors of a root: any root will do for the words, one
+    measurement has only one."""
     run = kalman_run(rng, seen=1)
     whitened = [nu / np.sqrt(F) for nu, F in zip(run[r"\nu"].values, run["F"].values, strict=True)]
     return run | {"s": Indexed(whitened)}
@@ -16,10 +17,25 @@ def course(rng):
 def western(rng):
     run = kalman_run(rng, seen=2)
     error = [rng.normal(size=(3, 1)) for _ in run["p"].values]
-    nees = [(one.T @ np.linalg.solve(cov, one)).item() for one, cov in zip(error, run["p"].values, strict=True)]
-    nis = [(one.T @ np.linalg.solve(cov, one)).item() for one, cov in zip(run[r"\nu"].values, run["F"].values, strict=True)]
-    ours = {"P": Indexed(lambda k, _: run["p"].values[k]), r"\tilde x": Indexed(lambda k, _: error[k])}
-    return ours | {r"\epsilon": Indexed(nees), r"\epsilon^\nu": Indexed(nis), r"\nu": run[r"\nu"], "S": run["F"], "k": run["k"]}
+    nees = [
+        (one.T @ np.linalg.solve(cov, one)).item()
+        for one, cov in zip(error, run["p"].values, strict=True)
+    ]
+    nis = [
+        (one.T @ np.linalg.solve(cov, one)).item()
+        for one, cov in zip(run[r"\nu"].values, run["F"].values, strict=True)
+    ]
+    ours = {
+        "P": Indexed(lambda k, _: run["p"].values[k]),
+        r"\tilde x": Indexed(lambda k, _: error[k]),
+    }
+    return ours | {
+        r"\epsilon": Indexed(nees),
+        r"\epsilon^\nu": Indexed(nis),
+        r"\nu": run[r"\nu"],
+        "S": run["F"],
+        "k": run["k"],
+    }
 
 
 constant_gain = r"""

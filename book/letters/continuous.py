@@ -1,4 +1,5 @@
-"""The letters of continuous.md: the package's equations, steps and steady state, with noises that are mixed."""
+"""The letters of continuous.md: the package's equations, steps and steady state, with noises that
+are mixed."""
 
 import numpy as np
 import sympy as sp
@@ -36,11 +37,22 @@ def rates(own, second_derivatives=False):
     equations, rng = filter_equations(own, second_derivatives), np.random.default_rng(1)
     z, D, y = column(rng.normal(size=2)), covariance(rng, 2), column(rng.normal(size=2))
     upper = [D[0, 0], D[0, 1], D[1, 1]]
-    values = sp.lambdify([*equations.state, *equations.y], equations.rates)(*z.ravel(), *upper, *y.ravel())
+    values = sp.lambdify([*equations.state, *equations.y], equations.rates)(
+        *z.ravel(), *upper, *y.ravel()
+    )
     dz, dD = values[:2], np.array([[values[2, 0], values[3, 0]], [values[3, 0], values[4, 0]]])
     f, S, g = (function(own, one) for one in (own.drift, own.signal, own.diffusion))
     A, H = slope(f, z), slope(S, z)
-    letters = {"z": z, "D": D, "y": y, "A": A, "H": H, "g": g(z), "N": own.noise_density, r"S_\xi": own.spectral_density}
+    letters = {
+        "z": z,
+        "D": D,
+        "y": y,
+        "A": A,
+        "H": H,
+        "g": g(z),
+        "N": own.noise_density,
+        r"S_\xi": own.spectral_density,
+    }
     return letters | {r"\dot z": dz, r"\dot D": dD, "I": np.eye(2)}, f, S
 
 
@@ -63,7 +75,13 @@ def box(rng):
     after = one.step(state, y.T).predicted
     A, H, g, N = slope(f, z), slope(S, z), function(own, own.diffusion)(z), own.noise_density
     B = D - D @ H.T @ np.linalg.solve(H @ D @ H.T + N / (2 * T), H @ D)
-    new = {r"z\leftarrow": column(after.mean), r"D\leftarrow": np.reshape(after.cov, (2, 2)), "B": B, "T": T, "y_k": y}
+    new = {
+        r"z\leftarrow": column(after.mean),
+        r"D\leftarrow": np.reshape(after.cov, (2, 2)),
+        "B": B,
+        "T": T,
+        "y_k": y,
+    }
     return {
         "z": z,
         "D": D,
@@ -87,12 +105,25 @@ def in_short(rng):
         "d": letters["D"],
         "m": letters["z"],
     }
-    return letters | slopes | {"f": f(letters["z"]), "S": S(letters["z"]), "K": K, "z(0)": letters["z"], "D(0)": letters["D"]}
+    return (
+        letters
+        | slopes
+        | {
+            "f": f(letters["z"]),
+            "S": S(letters["z"]),
+            "K": K,
+            "z(0)": letters["z"],
+            "D(0)": letters["D"],
+        }
+    )
 
 
 def western(rng):
     own = in_short(rng)
-    z, f, S = own["z"], *(function(one, matrix) for one in [model(rng)] for matrix in (one.drift, one.signal))
+    z, f, S = (
+        own["z"],
+        *(function(one, matrix) for one in [model(rng)] for matrix in (one.drift, one.signal)),
+    )
     names = {
         r"\hat x": z,
         r"\dot{\hat x}": own[r"\dot z"],
@@ -112,7 +143,10 @@ def discretised(rng):
     steps = to_discrete(own, T)
     x, xi, n = (rng.normal(size=2) for _ in range(3))
     here = dict(zip((*steps.x, *steps.v, *steps.w), (*x, *xi, *n), strict=True))
-    x_next, y = (column([float(one.subs(here)) for one in side]) for side in (steps.state_equation, steps.meter_equation))
+    x_next, y = (
+        column([float(one.subs(here)) for one in side])
+        for side in (steps.state_equation, steps.meter_equation)
+    )
     f, S, g = (function(own, one) for one in (own.drift, own.signal, own.diffusion))
     noises = {
         r"D_\xi": steps.state_noise.cov,
@@ -120,7 +154,12 @@ def discretised(rng):
         r"S_\xi": own.spectral_density,
         "N": own.noise_density,
     }
-    rows = {"x": Indexed([column(x), x_next]), "y": Indexed([y]), r"\xi": Indexed([column(xi)]), "n": Indexed([column(n)])}
+    rows = {
+        "x": Indexed([column(x), x_next]),
+        "y": Indexed([y]),
+        r"\xi": Indexed([column(xi)]),
+        "n": Indexed([column(n)]),
+    }
     return noises | rows | {"k": range(1), "T": T, "f": f, "S": S, "g": g}
 
 
@@ -134,7 +173,11 @@ def stationary(rng):
     )
     names = {"A": own.drift.jacobian(own.x), "G": own.diffusion, "H": own.signal.jacobian(own.x)}
     matrices = {name: np.array(matrix, dtype=float) for name, matrix in names.items()}
-    return matrices | {"D": steady_state(own).cov, "N": own.noise_density, r"S_\xi": own.spectral_density}
+    return matrices | {
+        "D": steady_state(own).cov,
+        "N": own.noise_density,
+        r"S_\xi": own.spectral_density,
+    }
 
 
 walk = r"""
@@ -154,13 +197,21 @@ def short_step(rng):
     law = linearised(steps).predict(letters["z"].T, letters["D"][None])
     Psi, D_n = np.reshape(law.cov, (2, 2)), steps.meter_noise.cov
     B = np.eye(2) + Psi @ letters["H"].T @ np.linalg.solve(D_n, letters["H"])
-    names = {"z": letters["z"], "D": letters["D"], "A": letters["A"], "H": letters["H"], "g": letters["g"], "I": np.eye(2)}
+    names = {
+        "z": letters["z"],
+        "D": letters["D"],
+        "A": letters["A"],
+        "H": letters["H"],
+        "g": letters["g"],
+        "I": np.eye(2),
+    }
     after = {r"\lambda": column(law.mean), r"\Psi": Psi, "f": f(letters["z"]), "T": T, "B": B}
     return names | after | {r"D_\xi": steps.state_noise.cov, "D_n": D_n}
 
 
 def riccati(a, q, r, start):
-    """D(t) of the scalar equation, as the quotient of two solutions of a linear one; `start` is a quotient too."""
+    """D(t) of the scalar equation, as the quotient of two solutions of a linear one; `start` is a
+    quotient too."""
     rates = np.array([[-a, q], [r, a]])
 
     def D(t):

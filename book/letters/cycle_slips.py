@@ -1,4 +1,5 @@
-"""The letters of cycle-slips.md: the mean time to a slip by Pontryagin's equation, the loop by iteration."""
+"""The letters of cycle-slips.md: the mean time to a slip by Pontryagin's equation, the loop by
+iteration."""
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
@@ -8,15 +9,25 @@ from scipy.special import iv
 
 
 def slips(rng):
-    """tau(0) = 1/q int_0^{2 pi} e^V(x) int_0^x e^-V(s) ds dx, the solution with tau = 0 at +-2 pi."""
+    """tau(0) = 1/q int_0^{2 pi} e^V(x) int_0^x e^-V(s) ds dx, the solution with tau = 0 at +-2
+    pi."""
     variance, q = rng.uniform(0.06, 0.12), rng.uniform(0.01, 0.1)
 
     def V(x):
         return (1 - np.cos(x)) / variance
 
     inner = lambda x: quad(lambda s: np.exp(-V(s)), 0, x, epsabs=0, epsrel=1e-12, limit=200)[0]  # noqa: E731
-    tau = quad(lambda x: np.exp(V(x)) * inner(x), 0, 2 * np.pi, epsabs=0, epsrel=1e-11, limit=400)[0] / q
-    return {r"\tau": tau, "q": q, r"\sigma_\varphi": np.sqrt(variance), "V": Of(V, r"\Delta"), "I_0": lambda x: iv(0, x)}
+    tau = (
+        quad(lambda x: np.exp(V(x)) * inner(x), 0, 2 * np.pi, epsabs=0, epsrel=1e-11, limit=400)[0]
+        / q
+    )
+    return {
+        r"\tau": tau,
+        "q": q,
+        r"\sigma_\varphi": np.sqrt(variance),
+        "V": Of(V, r"\Delta"),
+        "I_0": lambda x: iv(0, x),
+    }
 
 
 loop = r"""
@@ -41,13 +52,16 @@ def saw(rng):
     def V(x):
         return ((x + np.pi) % (2 * np.pi) - np.pi) ** 2 / (2 * variance)
 
-    inner = lambda x: quad(lambda s: np.exp(-V(s)), 0, x, points=[min(x, 5 * np.sqrt(variance))], limit=200)[0]  # noqa: E731
+    inner = lambda x: quad(  # noqa: E731
+        lambda s: np.exp(-V(s)), 0, x, points=[min(x, 5 * np.sqrt(variance))], limit=200
+    )[0]
     tau = quad(lambda x: np.exp(V(x)) * inner(x), 0, 2 * np.pi, points=[np.pi], limit=400)[0] / q
     return {r"\tau": tau, "q": q, r"\sigma_\varphi": np.sqrt(variance)}
 
 
 def pushed(rng):
-    """The probability to slip forwards, by its differential equation, q Pi'' + (b - q V') Pi' = 0."""
+    """The probability to slip forwards, by its differential equation, q Pi'' + (b - q V') Pi' =
+    0."""
     q, b, height = rng.uniform(0.5, 1), rng.uniform(0.1, 0.3), rng.uniform(0.5, 1)
 
     def W(x):
@@ -57,7 +71,9 @@ def pushed(rng):
         return [state[1], (height * np.sin(x) + 0.2 * np.sin(2 * x) - b / q) * state[1]]
 
     begin, end = -2 * np.pi, 2 * np.pi
-    way = solve_ivp(rates, (begin, end), [0, 1], method="DOP853", t_eval=[0, end], rtol=1e-12, atol=1e-14)
+    way = solve_ivp(
+        rates, (begin, end), [0, 1], method="DOP853", t_eval=[0, end], rtol=1e-12, atol=1e-14
+    )
     return {r"\Pi": way.y[0, 0] / way.y[0, 1], "W": Of(W, r"\Delta")}
 
 

@@ -1,4 +1,5 @@
-"""The letters of derive-it.md: it types no relation of its own, the chains are checked where they stand."""
+"""The letters of derive-it.md: it types no relation of its own, the chains are checked where they
+stand."""
 
 from gate.page import NOTATION
 

@@ -1,4 +1,5 @@
-"""The letters of discriminator.md: a loop with several components in the gain form, and the characteristic of a carrier."""
+"""The letters of discriminator.md: a loop with several components in the gain form, and the
+characteristic of a carrier."""
 
 import numpy as np
 from gate.page import NOTATION
@@ -13,7 +14,9 @@ def S(phi):
 
 
 def f(x):
-    return np.array([[x[0, 0] + 0.3 * x[1, 0]], [0.9 * x[1, 0] + 0.1 * x[2, 0] ** 2], [x[2, 0] - 0.2 * x[0, 0]]])
+    return np.array(
+        [[x[0, 0] + 0.3 * x[1, 0]], [0.9 * x[1, 0] + 0.1 * x[2, 0] ** 2], [x[2, 0] - 0.2 * x[0, 0]]]
+    )
 
 
 def run(rng):
@@ -33,13 +36,27 @@ def run(rng):
         K = Psi @ H.T @ np.linalg.inv(H @ Psi @ H.T + D_n)
         z, p = law + K @ (y - S(C @ law)), (np.eye(3) - K @ H) @ Psi
         u = np.linalg.lstsq(p @ C.T, z - law, rcond=None)[0]
-        for name, value in zip(names, (law, Psi, y, z, p, u, S(C @ law), at, slope(f, z)), strict=True):
+        for name, value in zip(
+            names, (law, Psi, y, z, p, u, S(C @ law), at, slope(f, z)), strict=True
+        ):
             rows[name].append(value)
         law, Psi = f(z), slope(f, z) @ p @ slope(f, z).T + g @ D_xi @ g.T
     letters = {name: Indexed(values) for name, values in rows.items() if name != "slope"}
     slopes = Of(lambda k: rows["slope"][k], "k")
-    extra = {"c": C, "D_n": D_n, r"D_\xi": D_xi, "g": g, "f": f, "k": K_RANGE, r"\Phi": Of(lambda k: rows[r"\Phi"][k], "k")}
-    return letters | extra | {"S_k'": slopes, r"\frac{\partial S_k(c\lambda_k)}{\partial\varphi}": slopes}
+    extra = {
+        "c": C,
+        "D_n": D_n,
+        r"D_\xi": D_xi,
+        "g": g,
+        "f": f,
+        "k": K_RANGE,
+        r"\Phi": Of(lambda k: rows[r"\Phi"][k], "k"),
+    }
+    return (
+        letters
+        | extra
+        | {"S_k'": slopes, r"\frac{\partial S_k(c\lambda_k)}{\partial\varphi}": slopes}
+    )
 
 
 def display(rng):
@@ -48,7 +65,13 @@ def display(rng):
 
 def western(rng):
     own = run(rng)
-    return {r"\hat x": given(own[r"\lambda"], own["z"]), "P": given(own[r"\Psi"], own["p"]), "c": C, "u": own["u"], "k": own["k"]}
+    return {
+        r"\hat x": given(own[r"\lambda"], own["z"]),
+        "P": given(own[r"\Psi"], own["p"]),
+        "c": C,
+        "u": own["u"],
+        "k": own["k"],
+    }
 
 
 carrier = r"""

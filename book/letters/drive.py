@@ -1,4 +1,5 @@
-"""The letters of drive.md: an arc at a constant yaw rate, integrated numerically, and one step of the model by hand."""
+"""The letters of drive.md: an arc at a constant yaw rate, integrated numerically, and one step of
+the model by hand."""
 
 import numpy as np
 import scipy
@@ -25,14 +26,17 @@ keep: V, t, p_V, p_\psi, q_V, q_\psi, D_\parallel, D_\perp
 
 
 def moved(rng):
-    """A step of the model in place, heading and speed, and the same with the map turned and shifted."""
+    """A step of the model in place, heading and speed, and the same with the map turned and
+    shifted."""
     alpha, turn, T, r = rng.uniform(0.5, 1.5, size=4)
     R = np.array([[np.cos(alpha), -np.sin(alpha)], [np.sin(alpha), np.cos(alpha)]])
     M, b = scipy.linalg.block_diag(R, np.eye(2)), column([*rng.normal(size=2), alpha, 0])
 
     def f(x):
         e, n, psi, V = x.ravel()
-        return column([e + T * V * np.cos(psi + turn), n + T * V * np.sin(psi + turn), psi + turn, V])
+        return column(
+            [e + T * V * np.cos(psi + turn), n + T * V * np.sin(psi + turn), psi + turn, V]
+        )
 
     def tangent(x):
         psi, V = x[2, 0] + turn, x[3, 0]
@@ -42,7 +46,16 @@ def moved(rng):
 
     x, Psi, H = column(rng.normal(size=4)), covariance(rng, 4), np.eye(2, 4)
     steps = {"f": f, "x": x, "A": tangent(x), "A'": tangent(M @ x + b), "p": covariance(rng, 4)}
-    return steps | {"M": M, "b": b, "R": R, "H": H, r"\Psi": Psi, "r": r, "I": np.eye(2), "F": H @ Psi @ H.T + r * np.eye(2)}
+    return steps | {
+        "M": M,
+        "b": b,
+        "R": R,
+        "H": H,
+        r"\Psi": Psi,
+        "r": r,
+        "I": np.eye(2),
+        "F": H @ Psi @ H.T + r * np.eye(2),
+    }
 
 
 long_tunnel = r"""

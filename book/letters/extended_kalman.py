@@ -1,4 +1,5 @@
-"""The letters of extended-kalman.md: a run of the package's extended filter, and the same filter in Western letters."""
+"""The letters of extended-kalman.md: a run of the package's extended filter, and the same filter in
+Western letters."""
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
@@ -27,7 +28,10 @@ def western(rng):
     own = extended_run(rng)
     x, P = given(own[r"\lambda"], own["z"]), given(own[r"\Psi"], own["p"])
     g, D_xi, H = own["g"].values, own[r"D_\xi"], own["H"].values
-    S = [slope_ @ cov @ slope_.T + own["D_n"] for slope_, cov in zip(H, own[r"\Psi"].values, strict=True)]
+    S = [
+        slope_ @ cov @ slope_.T + own["D_n"]
+        for slope_, cov in zip(H, own[r"\Psi"].values, strict=True)
+    ]
     return {
         r"\hat x": x,
         "P": P,

@@ -1,4 +1,5 @@
-"""The letters of filters-that-remember.md: a filter that remembers two measurements, as a plain program with NumPy's fits."""
+"""The letters of filters-that-remember.md: a filter that remembers two measurements, as a plain
+program with NumPy's fits."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -46,7 +47,16 @@ def windowed(rng):
         before = ahead or (1.0, 0.0)
         rows.append(
             {"y": y, "h": h, "G": G, "F": F}
-            | {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H.item(), "e": e, "z": z, r"\zeta": np.array(zeta), "u": u}
+            | {
+                r"\lambda": lam,
+                r"\Psi": Psi,
+                r"\sigma": sigma,
+                "H": H.item(),
+                "e": e,
+                "z": z,
+                r"\zeta": np.array(zeta),
+                "u": u,
+            }
             | {
                 r"\Gamma": Gamma,
                 r"\chi": np.full((1, RUNS), chi),
@@ -62,11 +72,16 @@ def windowed(rng):
         ahead = L.item(), n
         lam, Psi, x = ahead[0] * tau(u[0], T) + n, Theta(u[0], T), following
     every = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
-    return every | {r"\tau": lambda u, T: tau(u[0], T), r"\Theta": lambda u, T: Theta(u[0], T), "k": range(1, STEPS - 1)}
+    return every | {
+        r"\tau": lambda u, T: tau(u[0], T),
+        r"\Theta": lambda u, T: Theta(u[0], T),
+        "k": range(1, STEPS - 1),
+    }
 
 
 def lengthened(rng):
-    """The variance left by a regression on l measurements at once, and on so many that one more changes nothing."""
+    """The variance left by a regression on l measurements at once, and on so many that one more
+    changes nothing."""
     c, q, R = rng.uniform(0.8, 0.9), *rng.uniform(0.5, 1.5, 2)
     P = q / (1 - c**2)
 

@@ -1,4 +1,5 @@
-"""The letters of integration.md: runs of the package's filter of an axis, its Western form with matrices, the accelerometer."""
+"""The letters of integration.md: runs of the package's filter of an axis, its Western form with
+matrices, the accelerometer."""
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
@@ -16,14 +17,26 @@ def sensors(rng):
     """What the two sensors read, and the error that the slow one has."""
     lam, eps, n = rng.normal(size=(3, 5))
     S = [np.sin, np.cos, np.exp, np.tanh, np.cosh]
-    slow, radio = lam + eps, [one(value) + noise for one, value, noise in zip(S, lam, n, strict=True)]
+    slow, radio = (
+        lam + eps,
+        [one(value) + noise for one, value, noise in zip(S, lam, n, strict=True)],
+    )
     y, at = rng.normal(size=2)
     step = 1e-20
     return {
-        r"\lambda": Indexed(lam, at), r"\varepsilon": Indexed(eps), "n": Indexed(n), "S": Indexed(S), "k": K_RANGE,
-        SENSOR: Of(lambda k: slow[k], "k"), RADIO: Of(lambda k: radio[k], "k"), "S'": np.cos,
-        r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": np.sin(y - (y - at + 1j * step)).imag / step,
-    }  # fmt: skip
+        r"\lambda": Indexed(lam, at),
+        r"\varepsilon": Indexed(eps),
+        "n": Indexed(n),
+        "S": Indexed(S),
+        "k": K_RANGE,
+        SENSOR: Of(lambda k: slow[k], "k"),
+        RADIO: Of(lambda k: radio[k], "k"),
+        "S'": np.cos,
+        r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": np.sin(
+            y - (y - at + 1j * step)
+        ).imag
+        / step,
+    }
 
 
 axis = r"""
@@ -64,11 +77,23 @@ def western(rng, after=True):
     found = correct(system, ahead, gnss - ins)
     K = -found.cov @ np.linalg.inv(system.R)
     return {
-        "P^-": ahead.cov, "P": found.cov if after else P, "Q": system.Q, "R": system.R, "H": system.H, "I": np.eye(3), "K": K,
-        r"\delta z": column(gnss - ins), r"\delta\hat x^-": column(ahead.mean), r"\delta\hat x": column(found.mean),
-        r"(\cdot)": column(gnss - ins + ahead.mean), r"z_\text{GNSS}": column(gnss), r"z_\text{INS}": column(ins),
-        r"\hat v": column(ins - found.mean), r"v_\text{INS}": column(ins), r"\delta\hat v": column(found.mean),
-    }  # fmt: skip
+        "P^-": ahead.cov,
+        "P": found.cov if after else P,
+        "Q": system.Q,
+        "R": system.R,
+        "H": system.H,
+        "I": np.eye(3),
+        "K": K,
+        r"\delta z": column(gnss - ins),
+        r"\delta\hat x^-": column(ahead.mean),
+        r"\delta\hat x": column(found.mean),
+        r"(\cdot)": column(gnss - ins + ahead.mean),
+        r"z_\text{GNSS}": column(gnss),
+        r"z_\text{INS}": column(ins),
+        r"\hat v": column(ins - found.mean),
+        r"v_\text{INS}": column(ins),
+        r"\delta\hat v": column(found.mean),
+    }
 
 
 def western_before(rng):
@@ -160,7 +185,13 @@ p = \Psi-q
 def lecture(rng):
     """The general gain, and the lecture's."""
     own = western(rng)
-    law = {"G": own["H"], r"\Psi": own["P^-"], "p": own["P"], "F": own["P^-"] + own["R"], "K": own["P^-"] @ own["H"].T}
+    law = {
+        "G": own["H"],
+        r"\Psi": own["P^-"],
+        "p": own["P"],
+        "F": own["P^-"] + own["R"],
+        "K": own["P^-"] @ own["H"].T,
+    }
     K = np.linalg.solve(law["F"], law["K"].T).T
     return law | {"K": K, r"\tilde D": own["P^-"], "D": own["P"], "D_n": own["R"], "I": np.eye(3)}
 

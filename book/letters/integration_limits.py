@@ -1,4 +1,5 @@
-"""The letters of integration-limits.md: the package's covariance analysis, and its filter along a constant bias."""
+"""The letters of integration-limits.md: the package's covariance analysis, and its filter along a
+constant bias."""
 
 from gate.page import NOTATION
 

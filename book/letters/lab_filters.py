@@ -1,4 +1,5 @@
-"""The letters of lab-filters.md: three filters on an ensemble as plain programs with NumPy's fits, and a run of the package's."""
+"""The letters of lab-filters.md: three filters on an ensemble as plain programs with NumPy's fits,
+and a run of the package's."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -51,7 +52,11 @@ def covariance(one, other=None):
 
 def collected(rows, **more):
     names = list(rows[0])
-    return {name: Indexed([row[name] for row in rows]) for name in names} | {"k": range(1, STEPS - 1)} | more
+    return (
+        {name: Indexed([row[name] for row in rows]) for name in names}
+        | {"k": range(1, STEPS - 1)}
+        | more
+    )
 
 
 def two_step(rng):
@@ -64,7 +69,19 @@ def two_step(rng):
         z = lam + np.polyval([H, e], omega)
         alpha = a(z, 0)
         F, g, _ = fitted(x[k + 1], alpha)
-        rows.append({r"\lambda": lam, r"\omega": omega, "H": H, "e": e, "z": z, r"\alpha": alpha, "F": F, "g": g, "y": y[k]})
+        rows.append(
+            {
+                r"\lambda": lam,
+                r"\omega": omega,
+                "H": H,
+                "e": e,
+                "z": z,
+                r"\alpha": alpha,
+                "F": F,
+                "g": g,
+                "y": y[k],
+            }
+        )
         lam = np.polyval([F, g], alpha)
     return collected(rows, a=a, b=b, m_v=0.0, m_w=0.0)
 
@@ -82,16 +99,37 @@ def optimal_structure(rng):
         u = np.polyval([Gamma, chi], z)
         s = tau(u, T)
         L, n, _ = fitted(x[k + 1], s)
-        row = {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H, "e": e, "z": z, "u": u, "T": T, "y": y[k], "x": x[k]}
+        row = {
+            r"\lambda": lam,
+            r"\Psi": Psi,
+            r"\sigma": sigma,
+            "H": H,
+            "e": e,
+            "z": z,
+            "u": u,
+            "T": T,
+            "y": y[k],
+            "x": x[k],
+        }
         rows.append(
             row
-            | {r"\Gamma": Gamma, r"\chi": chi, "s": tau(rows[-1]["u"], rows[-1]["T"]) if rows else s, "hGFLn": (h, G, F, L, n)}
+            | {
+                r"\Gamma": Gamma,
+                r"\chi": chi,
+                "s": tau(rows[-1]["u"], rows[-1]["T"]) if rows else s,
+                "hGFLn": (h, G, F, L, n),
+            }
         )
         lam, Psi = np.polyval([L, n], s), Theta(u, T)
     parts = {
-        name: Of(lambda k, place=place: rows[k]["hGFLn"][place], "k") for place, name in enumerate(("h", "G", "F", "L", "n"))
+        name: Of(lambda k, place=place: rows[k]["hGFLn"][place], "k")
+        for place, name in enumerate(("h", "G", "F", "L", "n"))
     }
-    return collected(rows, tau=None) | parts | {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
+    return (
+        collected(rows, tau=None)
+        | parts
+        | {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
+    )
 
 
 def plain_prediction(rng):
@@ -99,7 +137,13 @@ def plain_prediction(rng):
     own = optimal_structure(rng)
     u, T = own["u"].values, own["T"].values
     ahead = [tau(*one) for one in zip(u, T, strict=True)]
-    return {"u": own["u"], "T": own["T"], r"\tau": tau, r"\lambda": Indexed([ahead[0], *ahead]), "k": own["k"]}
+    return {
+        "u": own["u"],
+        "T": own["T"],
+        r"\tau": tau,
+        r"\lambda": Indexed([ahead[0], *ahead]),
+        "k": own["k"],
+    }
 
 
 def second_fit(rng):
@@ -107,7 +151,11 @@ def second_fit(rng):
     sigma, noise = rng.normal(size=(2, RUNS))
     error = 0.7 * sigma + 0.3 + noise
     H, _, left = fitted(error, sigma)
-    gain = {r"J(1,0)-J_{\min}": np.mean((error - sigma) ** 2) - left, r"\mathsf D\sigma": covariance(sigma), "H": H}
+    gain = {
+        r"J(1,0)-J_{\min}": np.mean((error - sigma) ** 2) - left,
+        r"\mathsf D\sigma": covariance(sigma),
+        "H": H,
+    }
     return gain | {r"\bar\varepsilon": error.mean(), r"\bar\sigma": sigma.mean()}
 
 
@@ -122,15 +170,34 @@ def optimal(rng):
         return law[0].T, law[1].reshape(p.shape)
 
     functions = {r"\tau": lambda z, p: moved(z, p)[0], r"\Theta": lambda z, p: moved(z, p)[1]}
-    at_k = {"G": Of(lambda k: H[k], "k"), "F": Of(lambda k: F[k], "k"), "h": Of(lambda k: S(lam[k]), "k")}
-    return {name: own[name] for name in (r"\lambda", r"\Psi", "K", "z", "p", "y")} | functions | at_k | {"k": K_RANGE}
+    at_k = {
+        "G": Of(lambda k: H[k], "k"),
+        "F": Of(lambda k: F[k], "k"),
+        "h": Of(lambda k: S(lam[k]), "k"),
+    }
+    return (
+        {name: own[name] for name in (r"\lambda", r"\Psi", "K", "z", "p", "y")}
+        | functions
+        | at_k
+        | {"k": K_RANGE}
+    )
 
 
 def western(rng):
     own = extended_run(rng, BENT)
     H, Psi, K, lam = (own[name].plain for name in ("H", r"\Psi", "K", r"\lambda"))
     S = H @ Psi @ H.T + own["D_n"]
-    names = {"P^-": Psi, "P": own["p"].plain, "H": H, "S": S, "F": S, "C": Psi @ H.T, "K": K, "m": own["z"].plain, "m^-": lam}
+    names = {
+        "P^-": Psi,
+        "P": own["p"].plain,
+        "H": H,
+        "S": S,
+        "F": S,
+        "C": Psi @ H.T,
+        "K": K,
+        "m": own["z"].plain,
+        "m^-": lam,
+    }
     return names | {"y": own["y"].plain, r"\mu": own["S"].plain(lam)}
 
 
@@ -151,18 +218,39 @@ keep: C, F, G, h, K, \lambda, \Psi, y, z, \varepsilon, x
 
 
 def linear_meter(rng):
-    """The first line of Pugachev's filter, fitted to all signs that the error of the state and the noise can have."""
+    """The first line of Pugachev's filter, fitted to all signs that the error of the state and the
+    noise can have."""
     g, f, Psi = rng.uniform(0.5, 2, size=3)
     off, w = np.sqrt(Psi) * np.array([1, 1, -1, -1]), f * np.array([1, -1, 1, -1])
     lam = rng.normal()
     x, y = lam + off, g * (lam + off) + w
     H = np.polyfit(y - g * lam, off, 1)[0]
-    errors = {"x": x, "y": y, r"\lambda": lam, r"\omega": y - g * lam, "b": lambda x, w: g * x + f * w, "k": range(1)}
+    errors = {
+        "x": x,
+        "y": y,
+        r"\lambda": lam,
+        r"\omega": y - g * lam,
+        "b": lambda x, w: g * x + f * w,
+        "k": range(1),
+    }
     spread = {r"\mathsf D": Operator(np.var), r"\mathsf{Cov}": covariance}
-    return errors | spread | {"g": g, "f": f, "d": Psi, r"\Psi": Indexed([Psi]), "R": f**2, "H": Indexed([H])}
+    return (
+        errors
+        | spread
+        | {"g": g, "f": f, "d": Psi, r"\Psi": Indexed([Psi]), "R": f**2, "H": Indexed([H])}
+    )
 
 
-LETTERS = (two_step, second_fit, optimal_structure, plain_prediction, optimal, western, regression, linear_meter)
+LETTERS = (
+    two_step,
+    second_fit,
+    optimal_structure,
+    plain_prediction,
+    optimal,
+    western,
+    regression,
+    linear_meter,
+)
 SAID = {
     DEFINITION: [
         r"\lambda_0=m",

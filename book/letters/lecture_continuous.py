@@ -1,4 +1,5 @@
-"""The letters of lecture-continuous.md: the package's equations with second derivatives, and differences of the likelihood."""
+"""The letters of lecture-continuous.md: the package's equations with second derivatives, and
+differences of the likelihood."""
 
 import importlib.util
 from pathlib import Path
@@ -12,13 +13,16 @@ from scipy.optimize import brentq
 from kfcourse import linearised
 from kfcourse.continuous import to_discrete
 
-_spec = importlib.util.spec_from_file_location("letters.continuous", Path(__file__).with_name("continuous.py"))
+_spec = importlib.util.spec_from_file_location(
+    "letters.continuous", Path(__file__).with_name("continuous.py")
+)
 shared = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(shared)
 
 
 def derivatives(rng):
-    """The package's rates with second derivatives; the gradient and the Hessian of F by complex steps and differences."""
+    """The package's rates with second derivatives; the gradient and the Hessian of F by complex
+    steps and differences."""
     own = shared.model(rng)
     letters, f, S = shared.rates(own, second_derivatives=True)
     y, N = letters["y"], letters["N"]
@@ -31,7 +35,11 @@ def derivatives(rng):
 
     z, step = letters["z"], 1e-4
     sides = [
-        [gradient(z + sign * step * size * e[:, None]) for sign, size in ((1, 1), (-1, 1), (1, 2), (-1, 2))] for e in np.eye(2)
+        [
+            gradient(z + sign * step * size * e[:, None])
+            for sign, size in ((1, 1), (-1, 1), (1, 2), (-1, 2))
+        ]
+        for e in np.eye(2)
     ]
     U = np.hstack([(8 * (a - b) - (c - d)) / (12 * step) for a, b, c, d in sides])  # fourth order
     row = slope(rate, z)
@@ -76,7 +84,8 @@ keep: D, S', S'', N, \varepsilon
 
 
 def step(rng):
-    """A prediction of the discrete filter, and the law whose exponent is the prediction's and T F, by differences of it."""
+    """A prediction of the discrete filter, and the law whose exponent is the prediction's and T F,
+    by differences of it."""
     own, T = shared.model(rng), 0.1
     letters, f, _ = shared.rates(own)
     z = letters["z"]
@@ -86,8 +95,16 @@ def step(rng):
     def exponent(e):
         return T * e @ U @ e / 2 - e @ np.linalg.solve(Psi, e) / 2
 
-    bend = [[exponent(a + b) - exponent(a) - exponent(b) for b in np.eye(2)] for a in np.eye(2)]  # exact for a square
-    after = {r"\lambda": column(law.mean), r"\Psi": Psi, "U": U, "D_+": -np.linalg.inv(bend), "T": T, "f": f(z)}
+    # exact for a square
+    bend = [[exponent(a + b) - exponent(a) - exponent(b) for b in np.eye(2)] for a in np.eye(2)]
+    after = {
+        r"\lambda": column(law.mean),
+        r"\Psi": Psi,
+        "U": U,
+        "D_+": -np.linalg.inv(bend),
+        "T": T,
+        "f": f(z),
+    }
     x = rng.normal(size=(2, 1))
     return letters | after | {"x": x, "e": x - after[r"\lambda"]}
 
@@ -106,7 +123,8 @@ x = z
 
 
 def linear_signal(rng):
-    """The second derivative of the log-likelihood's rate where the signal is linear, by the slopes of its gradient."""
+    """The second derivative of the log-likelihood's rate where the signal is linear, by the slopes
+    of its gradient."""
     own = shared.model(rng, ["x1 + 0.2*x2", "x2 - 0.3*x1"])
     letters, _, S = shared.rates(own)
     y, N = letters["y"], letters["N"]
@@ -121,7 +139,12 @@ def ahead_of_data(rng):
     A, D, g = letters["A"], letters["D"], letters["g"]
     above = D + covariance(rng, 2)
     dot = A @ above + above @ A.T + g @ letters[r"S_\xi"] @ g.T / 2
-    return letters | {r"\bar D": above, r"\dot{\bar D}": dot, "E": above - D, r"\dot E": dot - letters[r"\dot D"]}
+    return letters | {
+        r"\bar D": above,
+        r"\dot{\bar D}": dot,
+        "E": above - D,
+        r"\dot E": dot - letters[r"\dot D"],
+    }
 
 
 even_signal = r"""
@@ -139,18 +162,38 @@ keep: y, N, U, S, x, \mathsf My
 
 
 def blow_up(rng):
-    """The scalar equation with U > 0 as the quotient of two solutions of a linear one; infinite where the lower one vanishes."""
+    """The scalar equation with U > 0 as the quotient of two solutions of a linear one; infinite
+    where the lower one vanishes."""
     a, q, D_0, N = rng.uniform(0.5, 1, size=4)
     U, t = 2 * a**2 / q, rng.uniform(0.1, 0.2)
 
     def pair(t):
         return expm(np.array([[-a, q], [-U, a]]) * t) @ [D_0, 1]
 
-    D, end = pair(t)[0] / pair(t)[1], brentq(lambda t: pair(t)[1], 0, np.pi / np.sqrt(q * U - a**2), xtol=1e-15)
+    D, end = (
+        pair(t)[0] / pair(t)[1],
+        brentq(lambda t: pair(t)[1], 0, np.pi / np.sqrt(q * U - a**2), xtol=1e-15),
+    )
     above, below = pair(t + 1e-20j)
     dot, omega = (above / below).imag / 1e-20, np.sqrt(q * U - a**2)
-    names = {"a": a, "q": q, "U": U, "t": t, "D": D, r"\dot D": dot, "J": 1 / D, r"\dot J": -dot / D**2, r"\omega": omega}
-    return names | {r"\varphi": np.arctan2(U * D_0 - a, omega), "D_0": D_0, "t_*": end, "N": N, r"\sigma": np.sqrt(2 / N)}
+    names = {
+        "a": a,
+        "q": q,
+        "U": U,
+        "t": t,
+        "D": D,
+        r"\dot D": dot,
+        "J": 1 / D,
+        r"\dot J": -dot / D**2,
+        r"\omega": omega,
+    }
+    return names | {
+        r"\varphi": np.arctan2(U * D_0 - a, omega),
+        "D_0": D_0,
+        "t_*": end,
+        "N": N,
+        r"\sigma": np.sqrt(2 / N),
+    }
 
 
 amplitude = r"""

@@ -1,4 +1,5 @@
-"""The letters of linearisation.md: runs of the package's extended filter of a scalar model, and of several states."""
+"""The letters of linearisation.md: runs of the package's extended filter of a scalar model, and of
+several states."""
 
 from functools import partial
 from itertools import product
@@ -29,9 +30,13 @@ def course(rng):
 
 
 def scalar(rng):
-    """Functions that stay the same, their slopes anywhere, and the noise of the object in both notations."""
+    """Functions that stay the same, their slopes anywhere, and the noise of the object in both
+    notations."""
     run = extended_run(rng, BENT_SCALAR)
-    at_k = {letter: Of(lambda k, one=run[name].values: one[k], "k") for letter, name in (("S'", "H"), ("f'", r"\Phi"))}
+    at_k = {
+        letter: Of(lambda k, one=run[name].values: one[k], "k")
+        for letter, name in (("S'", "H"), ("f'", r"\Phi"))
+    }
     g = run["g"].values
     at_k |= {"g": Of(lambda k: g[k], "k"), "Q": Of(lambda k: g[k] ** 2 * run[r"D_\xi"], "k")}
     same = {f"{name}_k'": partial(slope, run[name].plain) for name in "Sf"}
@@ -77,7 +82,8 @@ k: range 3
 
 
 def multiplied(rng):
-    """The package's filter without measurements, and the truth by all signs that the state and the noises can have."""
+    """The package's filter without measurements, and the truth by all signs that the state and the
+    noises can have."""
     c, e, m, p_0 = rng.uniform(0.85, 0.95), *rng.uniform(0.6, 0.8, size=3)
     ahead = linearised(Model.define("c*x + e*x*v", "x + w", {"c": c, "e": e}))
     signs = np.array(list(product((-1, 1), repeat=5)))
@@ -87,9 +93,17 @@ def multiplied(rng):
         laws.append(ahead.predict(*laws[-1]))
     u = np.sqrt(p_0) * signs[:, 0]
     return {
-        "c": c, "e": e, "m": m, "p": Indexed([law[1].item() for law in laws], p_0), "z": Indexed([law[0].item() for law in laws]),
-        "x": Indexed(x), "u": u, "V": Indexed([np.var(one) for one in x]), r"\mathsf M": Operator(np.mean), "k": range(4),
-    }  # fmt: skip
+        "c": c,
+        "e": e,
+        "m": m,
+        "p": Indexed([law[1].item() for law in laws], p_0),
+        "z": Indexed([law[0].item() for law in laws]),
+        "x": Indexed(x),
+        "u": u,
+        "V": Indexed([np.var(one) for one in x]),
+        r"\mathsf M": Operator(np.mean),
+        "k": range(4),
+    }
 
 
 exponent = r"""

@@ -1,4 +1,5 @@
-"""The letters of live-lab.md: the arguments of a gain, which is that of the best line through its law."""
+"""The letters of live-lab.md: the arguments of a gain, which is that of the best line through its
+law."""
 
 import numpy as np
 from gate.page import NOTATION
@@ -19,8 +20,15 @@ def gain(f, lam, Psi):
 def best_line(rng):
     """A gain, and the largest one, looked for over all variances."""
     f, lam = rng.uniform(0.1, 0.5), rng.uniform(1, 3)
-    largest = -minimize_scalar(lambda Psi: -gain(f, lam, Psi), bounds=(0.01, lam**2), method="bounded").fun
-    return {"K": gain(f, lam, rng.uniform(0.1, 5)), r"\max_{\Psi}K": largest, "f": f, r"\lambda": lam}
+    largest = -minimize_scalar(
+        lambda Psi: -gain(f, lam, Psi), bounds=(0.01, lam**2), method="bounded"
+    ).fun
+    return {
+        "K": gain(f, lam, rng.uniform(0.1, 5)),
+        r"\max_{\Psi}K": largest,
+        "f": f,
+        r"\lambda": lam,
+    }
 
 
 LETTERS = (best_line,)

@@ -1,4 +1,5 @@
-"""The letters of looking-back.md: a run of the package's linear filter, and its smoother by one regression on all of it."""
+"""The letters of looking-back.md: a run of the package's linear filter, and its smoother by one
+regression on all of it."""
 
 import numpy as np
 from gate.page import NOTATION
@@ -14,7 +15,10 @@ STEPS, STATES, SEEN = 6, 3, 2
 def _record(rng):
     A, H = rng.normal(size=(STATES, STATES)), rng.normal(size=(SEEN, STATES))
     system = LinearSystem(A, H, covariance(rng, STATES), covariance(rng, SEEN))
-    prior, y = Gaussian(rng.normal(size=STATES), covariance(rng, STATES)), rng.normal(size=(STEPS, 1, SEEN))
+    prior, y = (
+        Gaussian(rng.normal(size=STATES), covariance(rng, STATES)),
+        rng.normal(size=(STEPS, 1, SEEN)),
+    )
     found = run(system, prior, y)
     back = smooth(system, found)
     letters = {
@@ -46,7 +50,8 @@ def course(rng):
 
 
 def meeting(rng):
-    """The information about x_k by one regression: of all that is measured from the first step on, with its whole covariance."""
+    """The information about x_k by one regression: of all that is measured from the first step on,
+    with its whole covariance."""
     system, y, _, letters = _record(rng)
     A, H, Q, R = system.A, system.H, system.Q, system.R
 
@@ -55,9 +60,16 @@ def meeting(rng):
         powers = [np.linalg.matrix_power(A, j) for j in range(STEPS)]
 
         def rows(since):  # what the stacked measurements see of the state `since` steps after x_k
-            return np.vstack([np.empty((0, STATES)), *(H @ powers[j - since] if j >= since else 0 * H for j in reach)])
+            return np.vstack(
+                [
+                    np.empty((0, STATES)),
+                    *(H @ powers[j - since] if j >= since else 0 * H for j in reach),
+                ]
+            )
 
-        noise = np.kron(np.eye(len(reach)), R) + sum(rows(i) @ Q @ rows(i).T for i in range(1, STEPS))
+        noise = np.kron(np.eye(len(reach)), R) + sum(
+            rows(i) @ Q @ rows(i).T for i in range(1, STEPS)
+        )
         weighed = rows(0).T @ np.linalg.inv(noise)
         return weighed @ rows(0), weighed @ column(y[first:])
 

@@ -1,4 +1,5 @@
-"""The letters of manoeuvres.md: three modes with a joint table of probabilities; a place as a radar measures it."""
+"""The letters of manoeuvres.md: three modes with a joint table of probabilities; a place as a radar
+measures it."""
 
 from gate.page import CONDITION, DEFINITION, NOTATION
 
@@ -41,7 +42,13 @@ c_j = \sum_i\mu_i\pi_{ij}
 def place(rng):
     x = rng.normal(size=3)
     r, phi, epsilon = spherical(x)
-    return dict(zip((r"r_x", r"r_y", r"r_z", "r", r"\varphi", r"\epsilon"), (*x, r, phi, epsilon), strict=True))
+    return dict(
+        zip(
+            (r"r_x", r"r_y", r"r_z", "r", r"\varphi", r"\epsilon"),
+            (*x, r, phi, epsilon),
+            strict=True,
+        )
+    )
 
 
 two_modes = r"""

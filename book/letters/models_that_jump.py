@@ -1,4 +1,5 @@
-"""The letters of models-that-jump.md: three modes with a joint table of probabilities, mixtures by their second moments."""
+"""The letters of models-that-jump.md: three modes with a joint table of probabilities, mixtures by
+their second moments."""
 
 import numpy as np
 from gate.page import NOTATION

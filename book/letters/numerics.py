@@ -1,4 +1,5 @@
-"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array, Bierman's loop."""
+"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array,
+Bierman's loop."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -12,14 +13,28 @@ from kfcourse.linear.system import LinearSystem
 
 
 def _corrected(rng, seen):
-    """The letters of one correction by the package's textbook step; K = p H^T R^{-1}, which it does not compute with."""
-    Psi, H, R, A = covariance(rng, 3), rng.normal(size=(seen, 3)), covariance(rng, seen), rng.normal(size=(3, 3))
+    """The letters of one correction by the package's textbook step; K = p H^T R^{-1}, which it does
+    not compute with."""
+    Psi, H, R, A = (
+        covariance(rng, 3),
+        rng.normal(size=(seen, 3)),
+        covariance(rng, seen),
+        rng.normal(size=(3, 3)),
+    )
     y, lam = rng.normal(size=seen), rng.normal(size=3)
     z, p = correct(LinearSystem(A, H, np.eye(3), R), Gaussian(lam, Psi), y)
     return {
-        r"\Psi": Psi, "H": H, "R": R, "A": A, "I": np.eye(3), "p": p, "K": p @ H.T @ np.linalg.inv(R),
-        r"\lambda": column(lam), "z": column(z), "y": column(y),
-    }  # fmt: skip
+        r"\Psi": Psi,
+        "H": H,
+        "R": R,
+        "A": A,
+        "I": np.eye(3),
+        "p": p,
+        "K": p @ H.T @ np.linalg.inv(R),
+        r"\lambda": column(lam),
+        "z": column(z),
+        "y": column(y),
+    }
 
 
 def any_gain(rng):
@@ -41,7 +56,8 @@ def wrong_gain(rng):
 
 
 def array(rng):
-    """The orthogonal matrix by NumPy's QR decomposition, for the correction and for the prediction."""
+    """The orthogonal matrix by NumPy's QR decomposition, for the correction and for the
+    prediction."""
     found = _corrected(rng, 2)
     S, Q = np.linalg.cholesky(found[r"\Psi"]), covariance(rng, 3)
     wide = np.block([[np.linalg.cholesky(found["R"]), found["H"] @ S], [np.zeros((3, 2)), S]])
@@ -49,9 +65,16 @@ def array(rng):
     ahead = np.hstack([found["A"] @ S, np.linalg.cholesky(Q)])
     turned, root = np.linalg.qr(ahead.T)
     return found | {
-        "S": S, "Q": Q, "T": T, "X": right.T[:2, :2], "Y": right.T[2:, :2], "Z": right.T[2:, 2:], "S'": root.T, "T'": turned,
+        "S": S,
+        "Q": Q,
+        "T": T,
+        "X": right.T[:2, :2],
+        "Y": right.T[2:, :2],
+        "Z": right.T[2:, 2:],
+        "S'": root.T,
+        "T'": turned,
         "F": np.linalg.solve(np.eye(2) - found["H"] @ found["K"], found["R"]),
-    }  # fmt: skip
+    }
 
 
 def loop(rng):
@@ -71,12 +94,21 @@ def loop(rng):
     smaller = [None, *(diagonal * np.array(alpha[:-1]) / np.array(alpha[1:]))]
     U, D = np.hstack(columns[1:]), np.diag(smaller[1:])
     running = {
-        r"\alpha": Indexed(alpha), "n": n, "j": range(1, n + 1), "r": r, "h": h, "U": Indexed([None, *unit.T[:, :, None]], unit),
-        "f": Indexed([None, *f[:, 0]], f), "v": Indexed([None, *v[:, 0]], v), "D": Indexed([None, *diagonal], np.diag(diagonal)),
-        "K": Of(lambda j: before[j], "j"), r"K\leftarrow": Of(lambda j: after[j], "j"),
+        r"\alpha": Indexed(alpha),
+        "n": n,
+        "j": range(1, n + 1),
+        "r": r,
+        "h": h,
+        "U": Indexed([None, *unit.T[:, :, None]], unit),
+        "f": Indexed([None, *f[:, 0]], f),
+        "v": Indexed([None, *v[:, 0]], v),
+        "D": Indexed([None, *diagonal], np.diag(diagonal)),
+        "K": Of(lambda j: before[j], "j"),
+        r"K\leftarrow": Of(lambda j: after[j], "j"),
         r"U_j\leftarrow": Of(lambda j: columns[j], "j"),
-        r"D_j\leftarrow": Of(lambda j: smaller[j], "j"), r"U_j^{\rm old}": Of(lambda j: unit[:, [j - 1]], "j"),
-    }  # fmt: skip
+        r"D_j\leftarrow": Of(lambda j: smaller[j], "j"),
+        r"U_j^{\rm old}": Of(lambda j: unit[:, [j - 1]], "j"),
+    }
     return found, running, {"U": U, "D": D, "K": K}
 
 
@@ -106,11 +138,29 @@ def one_measurement(rng):
     F = scalar["H"] @ scalar[r"\Psi"] @ scalar["H"].T + scalar["R"]
     wide = np.hstack([own["A"] @ own["S"], np.linalg.cholesky(own["Q"])])
     T, _ = np.linalg.qr(wide.T, mode="complete")
-    turned = {r"(AS\;\;Q^{1/2})": wide, "T": T, r"(S'\;\;0)": np.hstack([own["S'"], np.zeros((3, 3))])}
-    return turned | {"p": scalar["p"], r"\Psi": scalar[r"\Psi"], "R": scalar["R"].item(), "F": F.item()}
+    turned = {
+        r"(AS\;\;Q^{1/2})": wide,
+        "T": T,
+        r"(S'\;\;0)": np.hstack([own["S'"], np.zeros((3, 3))]),
+    }
+    return turned | {
+        "p": scalar["p"],
+        r"\Psi": scalar[r"\Psi"],
+        "R": scalar["R"].item(),
+        "F": F.item(),
+    }
 
 
-LETTERS = (any_gain, wrong_gain, array, bierman, at_the_end, at_the_beginning, two_measurements, one_measurement)
+LETTERS = (
+    any_gain,
+    wrong_gain,
+    array,
+    bierman,
+    at_the_end,
+    at_the_beginning,
+    two_measurements,
+    one_measurement,
+)
 _BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
 _AFTER = r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}"
 _BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"

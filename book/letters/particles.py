@@ -1,4 +1,5 @@
-"""The letters of particles.md: the share of particles that counts after one measurement; names are checked beside them."""
+"""The letters of particles.md: the share of particles that counts after one measurement; names are
+checked beside them."""
 
 from gate.page import NOTATION
 
@@ -13,5 +14,8 @@ keep: \lim_{N\to\infty}\frac{N_e}N, r, y
 
 LETTERS = (weighted,)
 SAID = {
-    NOTATION: [r"\mathsf M_q\left[x^2\,\tfrac{p}{q}\right]", r"\frac{N_e}{N}\to\frac{(\mathsf M w)^2}{\mathsf M w^2}"],
+    NOTATION: [
+        r"\mathsf M_q\left[x^2\,\tfrac{p}{q}\right]",
+        r"\frac{N_e}{N}\to\frac{(\mathsf M w)^2}{\mathsf M w^2}",
+    ],
 }

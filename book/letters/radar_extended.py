@@ -1,4 +1,5 @@
-"""The letters of radar-extended.md: the package's filter with an acceleration made of measurements, and transfers by matrices."""
+"""The letters of radar-extended.md: the package's filter with an acceleration made of measurements,
+and transfers by matrices."""
 
 import numpy as np
 from gate.page import CONDITION, NOTATION
@@ -43,14 +44,24 @@ def filtered(rng, k=3):
     system = LinearSystem(A, H, (Q + Q.T) / 2, np.array([[SIGMA**2]]), B)
     law = run(system, Gaussian(rng.normal(size=2), covariance(rng, 2)), y[..., :1], u)
     (z, p), (lam, Psi) = (
-        ([column(one) for one in laws.mean[:, 0]], [one[0] for one in laws.cov]) for laws in (law.posterior, law.predicted)
+        ([column(one) for one in laws.mean[:, 0]], [one[0] for one in laws.cov])
+        for laws in (law.posterior, law.predicted)
     )
     K = p[k] @ H.T / SIGMA**2
     return found | {
-        r"\lambda": Indexed(lam, lam[k]), "z": Indexed(z, z[k]), "u": Indexed(u[:, 0, 0]), "y": Indexed(y[:, 0, 0]),
-        "k": range(2, 5), "p": p[k], r"\Psi": Psi[k], "K": K, "F": SIGMA**2 / (1 - (H @ K).item()), r"\Psi_{11}": Psi[k][0, 0],
-        r"\lambda\leftarrow": lam[k + 1], r"\Psi\leftarrow": Psi[k + 1],
-    }  # fmt: skip
+        r"\lambda": Indexed(lam, lam[k]),
+        "z": Indexed(z, z[k]),
+        "u": Indexed(u[:, 0, 0]),
+        "y": Indexed(y[:, 0, 0]),
+        "k": range(2, 5),
+        "p": p[k],
+        r"\Psi": Psi[k],
+        "K": K,
+        "F": SIGMA**2 / (1 - (H @ K).item()),
+        r"\Psi_{11}": Psi[k][0, 0],
+        r"\lambda\leftarrow": lam[k + 1],
+        r"\Psi\leftarrow": Psi[k + 1],
+    }
 
 
 def in_one_step(rng, k=3):
@@ -58,9 +69,15 @@ def in_one_step(rng, k=3):
     found = filtered(rng, k)
     y, u = found["y"], found["u"]
     fixed = {"y_k": y[k,], "y_{k-1}": y[k - 1,], "y_{k-2}": y[k - 2,], "u_k": u[k,]}
-    return {name: value for name, value in found.items() if name not in ("y", "u", "k", r"\lambda", "z")} | fixed | {
-        r"\lambda": found[r"\lambda"].plain, "z": found["z"].plain
-    }  # fmt: skip
+    return (
+        {
+            name: value
+            for name, value in found.items()
+            if name not in ("y", "u", "k", r"\lambda", "z")
+        }
+        | fixed
+        | {r"\lambda": found[r"\lambda"].plain, "z": found["z"].plain}
+    )
 
 
 expanded = (
@@ -97,11 +114,17 @@ def transfers(rng):
     for k in range(400):
         state = literal @ state + K * k
         behind.append(k - state[0, 0])
-    return found | {"E": error(0), "E_u": error(1), r"\zeta": 1.7, r"E_{\rm literal}": lambda one: behind[-1] - behind[-2]}
+    return found | {
+        "E": error(0),
+        "E_u": error(1),
+        r"\zeta": 1.7,
+        r"E_{\rm literal}": lambda one: behind[-1] - behind[-2],
+    }
 
 
 def far_apart(rng, j=3):
-    """The same with second differences over j steps, by what the filter makes of a single measurement."""
+    """The same with second differences over j steps, by what the filter makes of a single
+    measurement."""
     found, zeta = world(axis)(rng), 1.7
     A, B, H, K, T = (found[name] for name in "ABHKT")
     errors = []
@@ -120,7 +143,9 @@ def far_apart(rng, j=3):
 
 LETTERS = (axis, filtered, in_one_step, expanded, transfers, far_apart)
 SAID = {
-    "quoted from the radar paper": [r"z_k=z_{k-1}+K\bigl[y_k-h(\lambda_k)-H(\hat x_{k-1}-z_{k-1})\bigr]"],
+    "quoted from the radar paper": [
+        r"z_k=z_{k-1}+K\bigl[y_k-h(\lambda_k)-H(\hat x_{k-1}-z_{k-1})\bigr]"
+    ],
     "a setting": ["u_k=0"],
     NOTATION: [r"E(\zeta)"],
     CONDITION: [r"|\zeta|=1"],

@@ -1,4 +1,5 @@
-"""The letters of radar-tracking.md: the flight, a limit by python-control, least squares, and the package's alpha-beta filter."""
+"""The letters of radar-tracking.md: the flight, a limit by python-control, least squares, and the
+package's alpha-beta filter."""
 
 import numpy as np
 from control import dare
@@ -48,7 +49,12 @@ def flight(rng):
     track = aircraft(0.8)
     i = int(rng.integers(len(track.time)))
     east, north = track.velocity[i, :2]
-    return {r"\dot r_x": east, r"\dot r_y": north, "V": np.hypot(east, north), r"\psi": np.arctan2(north, east)}
+    return {
+        r"\dot r_x": east,
+        r"\dot r_y": north,
+        "V": np.hypot(east, north),
+        r"\psi": np.arctan2(north, east),
+    }
 
 
 def limit(rng):
@@ -69,10 +75,19 @@ def limit(rng):
         return (1 - alpha) * (zeta - 1) ** 2 / np.linalg.det(zeta * np.eye(2) - closed @ found["A"])
 
     return found | {
-        r"\Psi": Indexed(lambda i, j: Psi[i - 1, j - 1]), "F": F, r"\alpha": alpha, r"\beta": beta, "a_0": 1.7,
-        r"\Lambda": found[r"\sigma_a"] * found["T"] ** 2 / SIGMA, r"\chi": chi, "E": E, r"\zeta": near, r"\lim_{\zeta\to1}": 1.0,
-        r"\chi(-1)\big|_{\beta=\beta_-}": chi(-1, roots.min()), r"\chi(-1)\big|_{\beta=\beta_+}": chi(-1, roots.max()),
-    }  # fmt: skip
+        r"\Psi": Indexed(lambda i, j: Psi[i - 1, j - 1]),
+        "F": F,
+        r"\alpha": alpha,
+        r"\beta": beta,
+        "a_0": 1.7,
+        r"\Lambda": found[r"\sigma_a"] * found["T"] ** 2 / SIGMA,
+        r"\chi": chi,
+        "E": E,
+        r"\zeta": near,
+        r"\lim_{\zeta\to1}": 1.0,
+        r"\chi(-1)\big|_{\beta=\beta_-}": chi(-1, roots.min()),
+        r"\chi(-1)\big|_{\beta=\beta_+}": chi(-1, roots.max()),
+    }
 
 
 def growing(rng):
@@ -101,11 +116,19 @@ def step(rng):
     found, y, states = _followed(rng)
     gains = growing(rng)
     return {
-        "T": found["T"], "r": states[2, 0], "s": states[2, 1], "r^-": (found["A"] @ states[2])[0], "y": y[3],
-        r"\nu": y[3] - (found["A"] @ states[2])[0], r"\alpha": ALPHA, r"\beta": steady_beta(ALPHA),
-        r"\alpha_k": gains[r"\alpha"][4,], r"\beta_k": gains[r"\beta"][4,], r"r\leftarrow": states[3, 0],
+        "T": found["T"],
+        "r": states[2, 0],
+        "s": states[2, 1],
+        "r^-": (found["A"] @ states[2])[0],
+        "y": y[3],
+        r"\nu": y[3] - (found["A"] @ states[2])[0],
+        r"\alpha": ALPHA,
+        r"\beta": steady_beta(ALPHA),
+        r"\alpha_k": gains[r"\alpha"][4,],
+        r"\beta_k": gains[r"\beta"][4,],
+        r"r\leftarrow": states[3, 0],
         r"s\leftarrow": states[3, 1],
-    }  # fmt: skip
+    }
 
 
 noise_alone = r"""
@@ -129,12 +152,19 @@ def small_gains(rng):
 
 
 def limit_at_once(rng):
-    """The same limit as matrices, and the filter's answer to a measurement that grows by a factor at each step."""
+    """The same limit as matrices, and the filter's answer to a measurement that grows by a factor
+    at each step."""
     own, zeta, y = limit(rng), 1.7, rng.normal()
     Psi = np.array([[own[r"\Psi"][i, j] for j in (1, 2)] for i in (1, 2)])
     K, A, H = column([own[r"\alpha"], own[r"\beta"] / own["T"]]), own["A"], own["H"]
     x = np.linalg.solve(np.eye(2) - (np.eye(2) - K @ H) @ A / zeta, K * y)
-    answer = {r"\zeta": zeta, "y": y, r"\hat x": x, r"\hat r": x[0].item(), r"\rho": np.sqrt(1 - own[r"\alpha"])}
+    answer = {
+        r"\zeta": zeta,
+        "y": y,
+        r"\hat x": x,
+        r"\hat r": x[0].item(),
+        r"\rho": np.sqrt(1 - own[r"\alpha"]),
+    }
     return own | answer | {r"\Psi": Psi, "K": K, "q": own[r"\sigma_a"] ** 2}
 
 
@@ -154,7 +184,18 @@ keep: e^r, e^s, \alpha, \beta, n, k
 """
 
 
-LETTERS = (model, flight, limit, growing, start, step, noise_alone, small_gains, limit_at_once, errors)
+LETTERS = (
+    model,
+    flight,
+    limit,
+    growing,
+    start,
+    step,
+    noise_alone,
+    small_gains,
+    limit_at_once,
+    errors,
+)
 SAID = {
     DEFINITION: [r"v_k\sim\mathcal N(0,\sigma_a^2)", r"w_k\sim\mathcal N(0,\sigma^2)"],
     "quoted from the radar paper": [r"K=[\alpha,\beta/T]^T"],

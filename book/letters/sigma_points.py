@@ -1,4 +1,5 @@
-"""The letters of sigma-points.md: a correction that is iterated, and one by points, as plain programs."""
+"""The letters of sigma-points.md: a correction that is iterated, and one by points, as plain
+programs."""
 
 import numpy as np
 from gate.values import Indexed, Of, Operator, Unread
@@ -8,7 +9,11 @@ from scipy.stats import multivariate_normal
 
 def S(x):
     x = np.ravel(x)
-    return column(np.array([x[0] + 0.2 * x[1] ** 2, x[1] * x[2] + x[2]], dtype=x.dtype)) if x.dtype != complex else _complex(x)
+    return (
+        column(np.array([x[0] + 0.2 * x[1] ** 2, x[1] * x[2] + x[2]], dtype=x.dtype))
+        if x.dtype != complex
+        else _complex(x)
+    )
 
 
 def _complex(x):
@@ -16,7 +21,12 @@ def _complex(x):
 
 
 def given(rng):
-    return column(rng.normal(size=3)), covariance(rng, 3) / 9, column(rng.normal(size=2)), covariance(rng, 2) / 9
+    return (
+        column(rng.normal(size=3)),
+        covariance(rng, 3) / 9,
+        column(rng.normal(size=2)),
+        covariance(rng, 2) / 9,
+    )
 
 
 def iterated(rng, rounds=3):
@@ -33,7 +43,15 @@ def iterated(rng, rounds=3):
         "K": Of(lambda i: gains[i], "i"),
         r"\partial S(x_i)/\partial x": Of(lambda i: slopes[i], "i"),
     }
-    return at_i | {"x": Indexed(places), r"\lambda": lam, r"\Psi": Psi, "y": y, "D_n": D_n, "S": S, "i": range(rounds)}
+    return at_i | {
+        "x": Indexed(places),
+        r"\lambda": lam,
+        r"\Psi": Psi,
+        "y": y,
+        "D_n": D_n,
+        "S": S,
+        "i": range(rounds),
+    }
 
 
 def settled(rng):
@@ -42,7 +60,16 @@ def settled(rng):
     H, Psi = slope(S, own["x"].values[-1]), own[r"\Psi"]
     p = np.linalg.inv(np.linalg.inv(Psi) + H.T @ np.linalg.inv(own["D_n"]) @ H)
     K = p @ H.T @ np.linalg.inv(own["D_n"])
-    return {"z": own["x"].values[-2], "x": own["x"], "i": range(200, 201), "p": p, "I": np.eye(3), "K": K, "H": H, r"\Psi": Psi}
+    return {
+        "z": own["x"].values[-2],
+        "x": own["x"],
+        "i": range(200, 201),
+        "p": p,
+        "I": np.eye(3),
+        "K": K,
+        "H": H,
+        r"\Psi": Psi,
+    }
 
 
 def points(rng):
@@ -63,23 +90,60 @@ def points(rng):
     F = sum(w(i) * S(chi(i)) @ S(chi(i)).T for i in every) - h @ h.T + D_n
     C = sum(w(i) * chi(i) @ S(chi(i)).T for i in every) - lam @ h.T
     K = np.linalg.solve(F, C.T).T
-    law = {r"\lambda": lam, r"\Psi": Psi, "y": y, "D_n": D_n, "S": S, "h": h, "F": F, "C": C, "K": K}
-    after = {"z": lam + C @ np.linalg.solve(F, y - h), "p": Psi - C @ np.linalg.solve(F, C.T), "G": np.linalg.solve(Psi, C).T}
-    return law | after | {r"\chi": Indexed(chi), "w": Indexed(w), "n": n, r"\kappa": kappa, "j": every, "i": range(1, n + 1)}
+    law = {
+        r"\lambda": lam,
+        r"\Psi": Psi,
+        "y": y,
+        "D_n": D_n,
+        "S": S,
+        "h": h,
+        "F": F,
+        "C": C,
+        "K": K,
+    }
+    after = {
+        "z": lam + C @ np.linalg.solve(F, y - h),
+        "p": Psi - C @ np.linalg.solve(F, C.T),
+        "G": np.linalg.solve(Psi, C).T,
+    }
+    return (
+        law
+        | after
+        | {
+            r"\chi": Indexed(chi),
+            "w": Indexed(w),
+            "n": n,
+            r"\kappa": kappa,
+            "j": every,
+            "i": range(1, n + 1),
+        }
+    )
 
 
 def posterior(rng):
     lam, Psi, y, D_n = given(rng)
 
     def J(x):
-        laws = (multivariate_normal(cov=Psi), (x - lam).ravel()), (multivariate_normal(cov=D_n), (y - S(x)).ravel())
+        laws = (
+            (multivariate_normal(cov=Psi), (x - lam).ravel()),
+            (multivariate_normal(cov=D_n), (y - S(x)).ravel()),
+        )
         return sum(law.logpdf(off) - law.logpdf(0 * off) for law, off in laws)
 
-    return {"J": J, "x": column(rng.normal(size=3)), r"\lambda": lam, r"\Psi": Psi, "y": y, "D_n": D_n, "S": S}
+    return {
+        "J": J,
+        "x": column(rng.normal(size=3)),
+        r"\lambda": lam,
+        r"\Psi": Psi,
+        "y": y,
+        "D_n": D_n,
+        "S": S,
+    }
 
 
 def one_component(rng):
-    """Three points of one component as an ensemble; kappa = 2 is where they have the fourth moment."""
+    """Three points of one component as an ensemble; kappa = 2 is where they have the fourth
+    moment."""
     lam, sigma, kappa = rng.normal(), rng.uniform(0.5, 1.5), 2.0
     reach = np.sqrt(1 + kappa) * sigma
     weights = np.array([kappa, 0.5, 0.5]) / (1 + kappa)

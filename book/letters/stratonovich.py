@@ -1,4 +1,5 @@
-"""The letters of stratonovich.md: a linear model whose densities are all known, and a chain as a plain program."""
+"""The letters of stratonovich.md: a linear model whose densities are all known, and a chain as a
+plain program."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -68,7 +69,8 @@ def chain(rng):
 
 
 def odds(rng):
-    """The odds of the shadow after a step of the chain of two states, and the steepest slope of their logarithm."""
+    """The odds of the shadow after a step of the chain of two states, and the steepest slope of
+    their logarithm."""
     alpha, beta = rng.uniform(0.05, 0.3, size=2)
     P = np.array([[1 - alpha, alpha], [beta, 1 - beta]])  # from and to: present, shadowed
 
@@ -79,7 +81,9 @@ def odds(rng):
     def slope(log_o):
         return (np.log(after(np.exp(log_o + 1e-20j))) / 1e-20).imag
 
-    steepest = -minimize_scalar(lambda log_o: -slope(log_o), bounds=(-9, 9), method="bounded", options={"xatol": 1e-9}).fun
+    steepest = -minimize_scalar(
+        lambda log_o: -slope(log_o), bounds=(-9, 9), method="bounded", options={"xatol": 1e-9}
+    ).fun
     o = rng.uniform(0.5, 2)
     return {r"\alpha": alpha, r"\beta": beta, "o": o, "o'": after(o), r"\varkappa": steepest}
 
@@ -95,8 +99,16 @@ def splitting(rng):
         return float(mass @ values)
 
     before = joint.sum(axis=0) @ (x - lam) ** 2
-    means = {r"\mathsf M": Operator(mean), r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2))}
-    return means | {"p": Indexed([square - z**2]), "z": Indexed([z], z), r"\Psi": Indexed([before]), "k": range(1)}
+    means = {
+        r"\mathsf M": Operator(mean),
+        r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2)),
+    }
+    return means | {
+        "p": Indexed([square - z**2]),
+        "z": Indexed([z], z),
+        r"\Psi": Indexed([before]),
+        "k": range(1),
+    }
 
 
 shadow = r"""

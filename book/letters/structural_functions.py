@@ -1,4 +1,5 @@
-"""The letters of structural-functions.md: the structures of the package, and means by quadrature."""
+"""The letters of structural-functions.md: the structures of the package, and means by
+quadrature."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -7,7 +8,9 @@ from gate.worlds import normal_nodes, world
 
 from kfcourse import Model, gaussian, linearised
 
-MODEL = Model.define("c*x + 0.2*x**2 + e*x*v + 0.1*v", "g*x + f*x**2*w + 0.3*w", dict(c=0.9, e=0.5, g=1.2, f=0.4))
+MODEL = Model.define(
+    "c*x + 0.2*x**2 + e*x*v + 0.1*v", "g*x + f*x**2*w + 0.3*w", dict(c=0.9, e=0.5, g=1.2, f=0.4)
+)
 
 
 def a(x, v):
@@ -28,8 +31,15 @@ def of_package(structure, z, p):
 
 def by_tangents(rng):
     z, p = rng.uniform(0.2, 0.9, size=2)
-    slopes = {r"\frac{\partial a}{\partial x}": 0.9 + 0.4 * z, r"\frac{\partial a}{\partial v}": 0.5 * z + 0.1}
-    return of_package(linearised(MODEL), z, p) | slopes | {"a": a, "z": z, "m_v": 0.0, "p": p, "D_v": 1.0}
+    slopes = {
+        r"\frac{\partial a}{\partial x}": 0.9 + 0.4 * z,
+        r"\frac{\partial a}{\partial v}": 0.5 * z + 0.1,
+    }
+    return (
+        of_package(linearised(MODEL), z, p)
+        | slopes
+        | {"a": a, "z": z, "m_v": 0.0, "p": p, "D_v": 1.0}
+    )
 
 
 over_noise = r"""
@@ -75,7 +85,13 @@ def over_state(rng):
     G = mean(values[r"\beta"] * (x - m)) / d
     western = {"C": mean(values[r"\beta"] * (x - m)), "d": d}
     slope = {r"\frac{\partial h}{\partial m}": G, r"\partial h/\partial m": G}
-    return of_package(gaussian(MODEL), m, d) | values | slope | western | {r"\mathsf M": Operator(mean)}
+    return (
+        of_package(gaussian(MODEL), m, d)
+        | values
+        | slope
+        | western
+        | {r"\mathsf M": Operator(mean)}
+    )
 
 
 moments = r"""
@@ -93,16 +109,26 @@ def variant(rng):
     e, f, g, p = *rng.uniform(0.3, 0.6, size=3), rng.uniform(0.3, 0.6)
     z = rng.normal()
     own = Model.define("0.9*x + e*x*v", "g*x + f*x**2*w", dict(e=e, f=f, g=g))
-    both = {"Gaussian": of_package(gaussian(own), z, p), "linearised": of_package(linearised(own), z, p)}
+    both = {
+        "Gaussian": of_package(gaussian(own), z, p),
+        "linearised": of_package(linearised(own), z, p),
+    }
     values = {
-        rf"{name}_\text{{{way}}}": found[key] for way, found in both.items() for name, key in ((r"\Theta", r"\Theta"), ("F", "F"))
+        rf"{name}_\text{{{way}}}": found[key]
+        for way, found in both.items()
+        for name, key in ((r"\Theta", r"\Theta"), ("F", "F"))
     }
     return values | {"e": e, "f": f, "p": p, "d": p, "m": z}
 
 
 LETTERS = (by_tangents, over_noise, in_short, over_state, moments, variant)
 SAID = {
-    DEFINITION: ["x_{k+1}=a(x_k,v_k)", "y_k=b(x_k,w_k)", r"x\sim\mathcal N(z,p)", r"x\sim\mathcal N(m,d)"],
+    DEFINITION: [
+        "x_{k+1}=a(x_k,v_k)",
+        "y_k=b(x_k,w_k)",
+        r"x\sim\mathcal N(z,p)",
+        r"x\sim\mathcal N(m,d)",
+    ],
     NOTATION: [r"\mathsf M(x_{k+1}-\tau)^3"],
 }
 EQUALS = {

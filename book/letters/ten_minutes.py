@@ -8,7 +8,9 @@ from gate.values import Indexed
 
 from kfcourse import Model
 
-CODE = "\n".join(cells(Path(__file__).parents[1].joinpath("ten-minutes.md").read_text(encoding="utf-8")))
+CODE = "\n".join(
+    cells(Path(__file__).parents[1].joinpath("ten-minutes.md").read_text(encoding="utf-8"))
+)
 
 
 def first(rng):
@@ -32,11 +34,19 @@ def variant(rng):
     model, numbers = space["model"], rng.normal(size=3)
     here = dict(zip((*model.x, *model.v, *model.w), numbers, strict=True)) | model.values
     x_next, y = (float(one[0].subs(here)) for one in (model.state_equation, model.meter_equation))
-    return _letters(numbers[0], x_next, y, *numbers[1:]) | {str(name): float(value) for name, value in model.values.items()}
+    return _letters(numbers[0], x_next, y, *numbers[1:]) | {
+        str(name): float(value) for name, value in model.values.items()
+    }
 
 
 def _letters(x, x_next, y, v, w):
-    return {"k": range(1), "x": Indexed([x, x_next]), "y": Indexed([y]), "v": Indexed([v]), "w": Indexed([w])}
+    return {
+        "k": range(1),
+        "x": Indexed([x, x_next]),
+        "y": Indexed([y]),
+        "v": Indexed([v]),
+        "w": Indexed([w]),
+    }
 
 
 LETTERS = (first, variant)

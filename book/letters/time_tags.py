@@ -19,9 +19,16 @@ def prediction(rng):
     for _ in range(8):
         lam, Psi = short.A @ lam + short.B @ u, short.A @ Psi @ short.A.T + short.Q
     return {
-        "A": lambda d: motion.over(d).A, "B": lambda d: motion.over(d).B, "Q": lambda d: motion.over(d).Q, r"\Delta": delta,
-        "z": z, "p": p, "u": u, r"\lambda": lam, r"\Psi": Psi,
-    }  # fmt: skip
+        "A": lambda d: motion.over(d).A,
+        "B": lambda d: motion.over(d).B,
+        "Q": lambda d: motion.over(d).Q,
+        r"\Delta": delta,
+        "z": z,
+        "p": p,
+        "u": u,
+        r"\lambda": lam,
+        r"\Psi": Psi,
+    }
 
 
 late = r"""
@@ -50,6 +57,15 @@ K = 1-R/(p+Q+R)
 
 LETTERS = (clock, prediction, late, one_step_late, late_gain)
 SAID = {
-    DEFINITION: [r"\hat s(t)=s(t-\tau)", r"\hat V(t)=\dot s(t-\tau)", r"\hat b(t)=u(t)-\ddot s(t-\tau)", "c(t)=rt+c_0"],
+    DEFINITION: [
+        r"\hat s(t)=s(t-\tau)",
+        r"\hat V(t)=\dot s(t-\tau)",
+        r"\hat b(t)=u(t)-\ddot s(t-\tau)",
+        "c(t)=rt+c_0",
+    ],
 }
-EQUALS = {r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6", r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2", r"{\hat{b}-b}": r"j\tau"}
+EQUALS = {
+    r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6",
+    r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2",
+    r"{\hat{b}-b}": r"j\tau",
+}

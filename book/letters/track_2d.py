@@ -1,4 +1,5 @@
-"""The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a telescoping sum."""
+"""The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a
+telescoping sum."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -19,7 +20,8 @@ def _run(rng, lost=None):
         y[lost] = np.nan
     found = run(system, Gaussian(rng.normal(size=4), covariance(rng, 4)), y, u)
     (z, p), (lam, Psi) = (
-        ([column(one[0]) for one in law.mean], [one[0] for one in law.cov]) for law in (found.posterior, found.predicted)
+        ([column(one[0]) for one in law.mean], [one[0] for one in law.cov])
+        for law in (found.posterior, found.predicted)
     )
     return system, y, u, z, p, lam, Psi
 
@@ -28,10 +30,27 @@ def filtered(rng):
     system, y, u, z, p, lam, Psi = _run(rng)
     K = [one @ system.H.T @ np.linalg.inv(system.R) for one in p]
     F = [np.linalg.solve(np.eye(2) - system.H @ gain, system.R) for gain in K]
-    nu = [np.linalg.lstsq(gain, after - before, rcond=None)[0] for gain, after, before in zip(K, z, lam, strict=True)]
-    rows = {"y": [column(one) for one in y], "u": [column(one) for one in u], "z": z, "p": p, r"\lambda": lam, r"\Psi": Psi}
+    nu = [
+        np.linalg.lstsq(gain, after - before, rcond=None)[0]
+        for gain, after, before in zip(K, z, lam, strict=True)
+    ]
+    rows = {
+        "y": [column(one) for one in y],
+        "u": [column(one) for one in u],
+        "z": z,
+        "p": p,
+        r"\lambda": lam,
+        r"\Psi": Psi,
+    }
     rows |= {"K": K, "F": F, r"\nu": nu}
-    fixed = {"A": system.A, "B": system.B, "H": system.H, "Q": system.Q, "R": system.R, "I": np.eye(4)}
+    fixed = {
+        "A": system.A,
+        "B": system.B,
+        "H": system.H,
+        "Q": system.Q,
+        "R": system.R,
+        "I": np.eye(4),
+    }
     fixed |= {"S": INTENSITY, r"\Delta": DELTA, r"\sigma": SIGMA, "k": K_RANGE}
     return fixed | {name: Indexed(values, values[2]) for name, values in rows.items()}
 
@@ -79,7 +98,9 @@ SAID = {
     NOTATION: [r"Q_{\rm const}", r"Q_{\rm white}", r"\delta^2", r"s(\tau)", "0"],
 }
 EQUALS = {
-    r"G\,(a_x,a_y,a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}",
-    r"B\,(a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}",
+    r"G\,(a_x,a_y,a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta "
+    r"a_y\end{pmatrix}",
+    r"B\,(a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta "
+    r"a_y\end{pmatrix}",
     r"\delta_{k+1}-\delta_k": r"\frac32(y_0-2y_1+y_2)",
 }

@@ -1,4 +1,5 @@
-"""The letters of what-the-data-say.md: a level that wanders, its record's density at once, and one round of EM by a dense law."""
+"""The letters of what-the-data-say.md: a level that wanders, its record's density at once, and one
+round of EM by a dense law."""
 
 import numpy as np
 from gate.page import NOTATION, STATED
@@ -18,7 +19,11 @@ def wandering(rng):
     """The record's law is one normal law; the innovations are the package's."""
     q, r, d = rng.uniform(0.5, 2, 3)
     model = Model.define(
-        "x + v", "x + w", prior={"mean": 0, "variance": d}, state_noise={"variance": q}, meter_noise={"variance": r}
+        "x + v",
+        "x + w",
+        prior={"mean": 0, "variance": d},
+        state_noise={"variance": q},
+        meter_noise={"variance": r},
     )
     one, y = kalman_filter(model), rng.normal(size=N + 1)
     at = np.arange(N + 1)
@@ -30,7 +35,13 @@ def wandering(rng):
     z, p = gain @ y, states - gain @ states
     back, own = smooth(one, y), run(one, y).cov.ravel()
     expected = np.mean(np.diff(z) ** 2 + np.diag(p)[1:] + np.diag(p)[:-1] - 2 * np.diag(p, 1))
-    letters = {r"\ln L": log_density, r"\nu": Indexed(nu.ravel()), "F": Indexed(F.ravel()), "q": expected, "N": N}
+    letters = {
+        r"\ln L": log_density,
+        r"\nu": Indexed(nu.ravel()),
+        "F": Indexed(F.ravel()),
+        "q": expected,
+        "N": N,
+    }
     return letters | {
         r"\bar z": Indexed(back.mean.ravel()),
         r"\bar p": Indexed(back.cov.ravel()),
@@ -57,7 +68,8 @@ forget: w
 
 
 def rounds(rng, r_of_m=0.5):
-    """Rounds of EM for independent states, each the mean of their squares over a record whose mean square is m."""
+    """Rounds of EM for independent states, each the mean of their squares over a record whose mean
+    square is m."""
     y = rng.normal(size=5)
     m = float(np.mean(y**2))
     r = r_of_m * m
@@ -69,7 +81,14 @@ def rounds(rng, r_of_m=0.5):
     q = [m]
     for _ in range(20_001):
         q.append(after(q[-1]))
-    return {"m": m, "r": r, "K": q[-1] / (q[-1] + r), "q": Indexed(q, q[-1]), "q'": after(q[-1]), "j": range(20_000, 20_001)}
+    return {
+        "m": m,
+        "r": r,
+        "K": q[-1] / (q[-1] + r),
+        "q": Indexed(q, q[-1]),
+        "q'": after(q[-1]),
+        "j": range(20_000, 20_001),
+    }
 
 
 def quiet_rounds(rng):
@@ -97,4 +116,8 @@ SAID = {
     STATED: [r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})"],
     NOTATION: [r"\ln p(y_0)+\ln p(y_1\mid y_0)", r"\ln p(y_0,y_1)", r"\mathsf M r_k^2"],
 }
-EQUALS = {"N/(2q^2)": r"I_\text{states}", r"N/\bigl(2(q+r)^2\bigr)": r"I_\text{record}", r"(1-q/\sqrt a)/r": r"\bar s_r"}
+EQUALS = {
+    "N/(2q^2)": r"I_\text{states}",
+    r"N/\bigl(2(q+r)^2\bigr)": r"I_\text{record}",
+    r"(1-q/\sqrt a)/r": r"\bar s_r",
+}

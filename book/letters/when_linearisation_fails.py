@@ -1,4 +1,5 @@
-"""The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by quadrature."""
+"""The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by
+quadrature."""
 
 from gate.page import CONDITION, NOTATION
 from gate.worlds import world
@@ -61,7 +62,8 @@ def western(rng):
 
 
 def again(rng):
-    """A constant measured n times, the first time with a larger error than is claimed: the filter's own recursion."""
+    """A constant measured n times, the first time with a larger error than is claimed: the filter's
+    own recursion."""
     kappa, p, n = rng.uniform(1, 3), rng.uniform(0.5, 2), int(rng.integers(4, 9))
     claimed, square = p, (1 + 3 * kappa**2 / 4) * p
     for _ in range(n - 1):

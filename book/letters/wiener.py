@@ -1,4 +1,5 @@
-"""The letters of wiener.md: spectra as sums over correlations, a limit by python-control, least squares for the amplitude."""
+"""The letters of wiener.md: spectra as sums over correlations, a limit by python-control, least
+squares for the amplitude."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -24,7 +25,8 @@ keep: a, Q, R, \zeta, S_x(\zeta), S_y(\zeta), K, \gamma, z, y_k, z\leftarrow
 
 
 def waiting(rng, m=3):
-    """The best linear estimate of a state from a long record that ends m steps later, and from one that ends with it."""
+    """The best linear estimate of a state from a long record that ends m steps later, and from one
+    that ends with it."""
     found = world(signal)(rng)
     a, Q, R, K = (found[name] for name in "aQRK")
 
@@ -35,7 +37,14 @@ def waiting(rng, m=3):
         return Q / (1 - a**2) - of_x @ np.linalg.solve(of_y, of_x)
 
     rho = R / (1 - K)
-    return {"p_m": left(m), "p_0": left(0), "b": K * rho, r"\rho": rho, r"\gamma": found[r"\gamma"], "m": m}
+    return {
+        "p_m": left(m),
+        "p_0": left(0),
+        "b": K * rho,
+        r"\rho": rho,
+        r"\gamma": found[r"\gamma"],
+        "m": m,
+    }
 
 
 amplitude = r"""
@@ -64,15 +73,24 @@ C_k = \sum_is_iy_{k-3+i}
 
 
 def bucy(rng):
-    """The stationary continuous filter of an axis, its gain by SciPy, as a function of the frequency."""
+    """The stationary continuous filter of an axis, its gain by SciPy, as a function of the
+    frequency."""
     Omega, nu, p = rng.uniform(1, 2), rng.uniform(1, 2), rng.uniform(1, 2)
     A, H = np.array([[0.0, 1], [0, 0]]), np.array([[1.0, 0]])
     K = solve_continuous_are(A.T, H.T, np.diag([0, nu * Omega**4]), np.array([[nu]])) @ H.T / nu
     C = [np.linalg.det(sign * p * np.eye(2) - A + K @ H) for sign in (1, -1)]
     return {
-        "p": p, "A": A, "H": H, "K": K, "I": np.eye(2), r"\Omega": Omega, r"\nu": nu, "C(p)": C[0], "C(-p)": C[1],
+        "p": p,
+        "A": A,
+        "H": H,
+        "K": K,
+        "I": np.eye(2),
+        r"\Omega": Omega,
+        r"\nu": nu,
+        "C(p)": C[0],
+        "C(-p)": C[1],
         "W(p)": 1 - p**2 / C[0],
-    }  # fmt: skip
+    }
 
 
 shrinking = r"""
@@ -98,7 +116,9 @@ j: range 4
 def found(rng):
     """The greatest ratio for one pulse: the mean of the correlator over its deviation, squared."""
     own = world(amplitude)(rng)
-    return {name: own[name] for name in ("R", "E", "b")} | {"d": own["b"] * own["E"] / np.sqrt(own["R"] * own["E"])}
+    return {name: own[name] for name in ("R", "E", "b")} | {
+        "d": own["b"] * own["E"] / np.sqrt(own["R"] * own["E"])
+    }
 
 
 LETTERS = (signal, waiting, amplitude, correlator, weights, bucy, shrinking, found)
@@ -107,7 +127,9 @@ SAID = {
     "quoted from Van Trees": [
         r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+"
     ],
-    "verified below, for four samples": [r"\frac{b^2\left(\sum g_ks_k\right)^2}{R\sum g_k^2}\;\le\;\frac{b^2}{R}\sum s_k^2"],
+    "verified below, for four samples": [
+        r"\frac{b^2\left(\sum g_ks_k\right)^2}{R\sum g_k^2}\;\le\;\frac{b^2}{R}\sum s_k^2"
+    ],
     "a condition": [r"|\gamma|<1"],
     NOTATION: [r"\bigl[\,\cdot\,\bigr]", r"W(\zeta)", "W(p)", "C(p)", "C(-p)", "|D|^2", "|C|^2"],
     "a setting": ["d^2=13"],

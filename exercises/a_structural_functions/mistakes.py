@@ -1,4 +1,5 @@
-"""More known mistakes of set a: in the noise's part of a covariance, in moments of the normal law."""
+"""More known mistakes of set a: in the noise's part of a covariance, in moments of the normal
+law."""
 
 from __future__ import annotations
 
@@ -8,20 +9,32 @@ import sympy as sp
 
 from kfcourse.symbolic.sides import Side
 
-Row = tuple[str, str, Callable[[Side], sp.MatrixBase]]  # name, what to say, the part of the noise, or the covariance
+# name, what to say, the part of the noise, or the covariance
+Row = tuple[str, str, Callable[[Side], sp.MatrixBase]]
 Moment = Callable[[int, sp.Expr, sp.Expr], sp.Expr]  # M x^k for x ~ N(m, d)
 
 FUNCTION_FOR_DERIVATIVE = "The function itself stands where its derivative belongs."
-NOT_SQUARED_AS_A_WHOLE = "The noise's factor is squared as a whole: the parameter in it, and what depends on the state."
-NOISE_IN_SLOPE = "The slope by the state is taken with the noise at its mean; the factor of the noise does not belong to it."
-NOISE_TIMES_VARIANCE = "The noise's part does not come through the slope: the variance of the state does not multiply it."
-NOISES_IN_ANOTHER_ORDER = "The variances of the noises stand in another order: which noise is in which equation?"
+NOT_SQUARED_AS_A_WHOLE = (
+    "The noise's factor is squared as a whole: the parameter in it, and what depends on the state."
+)
+NOISE_IN_SLOPE = (
+    "The slope by the state is taken with the noise at its mean; the factor of the "
+    "noise does not belong to it."
+)
+NOISE_TIMES_VARIANCE = (
+    "The noise's part does not come through the slope: the variance of the "
+    "state does not multiply it."
+)
+NOISES_IN_ANOTHER_ORDER = (
+    "The variances of the noises stand in another order: which noise is in which equation?"
+)
 CORRELATION_FORGOTTEN = "Only the variances are there; the components are correlated."
 SECOND_MOMENT = "It is a second moment: the product of the means has not been subtracted."
 
 
 def one(matrix: sp.MatrixBase) -> sp.Expr:
-    """The entry of a one by one matrix; ValueError otherwise: some mistakes are possible for scalars only."""
+    """The entry of a one by one matrix; ValueError otherwise: some mistakes are possible for
+    scalars only."""
     if matrix.shape != (1, 1):
         raise ValueError("only scalar variants allow this mistake")
     return matrix[0]
@@ -50,7 +63,8 @@ def _several(s: Side) -> Side:
 
 
 def _slope_of_noise(s: Side) -> sp.Expr:
-    """How the noise's factor changes with the state; ValueError if it does not: then it cannot get into the slope."""
+    """How the noise's factor changes with the state; ValueError if it does not: then it cannot get
+    into the slope."""
     slope = one(s.B).diff(one(s.mean))
     if slope == 0:
         raise ValueError("only where the noise's factor depends on the state")
@@ -79,11 +93,17 @@ WRONG_LINEARISED: tuple[Row, ...] = (
         NOISE_TIMES_VARIANCE,
         lambda s: _scalar((one(s.A) ** 2 + one(noise_part(s))) * one(s.cov)),
     ),
-    ("second-moment", SECOND_MOMENT, lambda s: s.A * s.cov * s.A.T + noise_part(s) + s.value * s.value.T),
+    (
+        "second-moment",
+        SECOND_MOMENT,
+        lambda s: s.A * s.cov * s.A.T + noise_part(s) + s.value * s.value.T,
+    ),
     (
         "noises-in-another-order",
         NOISES_IN_ANOTHER_ORDER,
-        lambda s: s.A * s.cov * s.A.T + sp.diag(*noise_part(_several(s)).diagonal().tolist()[0][::-1]),
+        lambda s: (
+            s.A * s.cov * s.A.T + sp.diag(*noise_part(_several(s)).diagonal().tolist()[0][::-1])
+        ),
     ),
     (
         "correlation-forgotten",
@@ -97,11 +117,13 @@ WRONG_LINEARISED: tuple[Row, ...] = (
 
 
 def moment_with(
-    central: tuple[int, ...] = (1, 0, 1, 0, 3, 0, 15, 0, 105), binomial: Callable[[int, int], sp.Expr] = sp.binomial
+    central: tuple[int, ...] = (1, 0, 1, 0, 3, 0, 15, 0, 105),
+    binomial: Callable[[int, int], sp.Expr] = sp.binomial,
 ) -> Moment:
     """M (m + deviation)^k multiplied out, with other central moments or other coefficients."""
     return lambda k, m, d: sum(
-        (binomial(k, j) * m ** (k - j) * central[j] * d ** sp.Rational(j, 2) for j in range(k + 1)), sp.Integer(0)
+        (binomial(k, j) * m ** (k - j) * central[j] * d ** sp.Rational(j, 2) for j in range(k + 1)),
+        sp.Integer(0),
     )
 
 
@@ -119,7 +141,9 @@ def averaged(s: Side, moment: Moment) -> sp.Expr:
     ValueError if the factor is no polynomial, or the same everywhere, so that no moment is taken.
     """
     x = s.x[0]
-    factor = one(s.equation.jacobian(sp.Matrix(s.noise))).subs(dict(zip(s.noise, s.law.mean, strict=True)))
+    factor = one(s.equation.jacobian(sp.Matrix(s.noise))).subs(
+        dict(zip(s.noise, s.law.mean, strict=True))
+    )
     powers = sp.Poly(factor**2 * one(s.D), x)
     terms = [(k, c) for (k,), c in powers.terms()]
     if any(k % 2 or k > 8 for k, _ in terms) or not any(k for k, _ in terms):
@@ -135,10 +159,15 @@ def exact_noise_part(s: Side) -> sp.MatrixBase:
 
 
 POWER_OF_MOMENT = "A higher moment is not a power of the mean square, nor a multiple of it."
-CENTRAL_MOMENT = "The fourth central moment of the normal law is missing, or has another coefficient."
+CENTRAL_MOMENT = (
+    "The fourth central moment of the normal law is missing, or has another coefficient."
+)
 COEFFICIENT = "A coefficient is wrong: multiply out the power of mean plus deviation once more."
 MEAN_SQUARE = "The mean square is wrong: a variance is a difference of two moments, which are they?"
-VARIANCE_FOR_MOMENT = "That takes the variance of the noise's factor; as the noise has mean zero, its mean square belongs there."
+VARIANCE_FOR_MOMENT = (
+    "That takes the variance of the noise's factor; as the noise has mean zero, "
+    "its mean square belongs there."
+)
 
 WRONG_MOMENTS: tuple[tuple[str, str, Moment], ...] = (
     ("power-of-moment", POWER_OF_MOMENT, lambda k, m, d: (m**2 + d) ** (k // 2)),
@@ -157,7 +186,10 @@ WRONG_MOMENTS: tuple[tuple[str, str, Moment], ...] = (
 
 # What stands in the place of the noise's part of the exact covariance.
 WRONG_NOISE_PARTS: tuple[Row, ...] = (
-    *((name, says, lambda s, moment=moment: _scalar(averaged(s, moment))) for name, says, moment in WRONG_MOMENTS),
+    *(
+        (name, says, lambda s, moment=moment: _scalar(averaged(s, moment)))
+        for name, says, moment in WRONG_MOMENTS
+    ),
     ("noise-not-squared", NOT_SQUARED_AS_A_WHOLE, lambda s: exact_noise_part(s) / factors(s)[0]),
     ("noise-times-variance", NOISE_TIMES_VARIANCE, lambda s: noise_part(s) * one(s.cov)),
     (
@@ -176,5 +208,9 @@ def _slope_power(s: Side) -> sp.Matrix:
 # What is added to the exact covariance.
 WRONG_STATE_PARTS: tuple[Row, ...] = (
     ("slope-power", "The slope enters only once: a variance goes with its square.", _slope_power),
-    ("noise-in-slope", NOISE_IN_SLOPE, lambda s: _slope_with_noise(s) - s.A**2 * s.cov - exact_noise_part(s)),
+    (
+        "noise-in-slope",
+        NOISE_IN_SLOPE,
+        lambda s: _slope_with_noise(s) - s.A**2 * s.cov - exact_noise_part(s),
+    ),
 )

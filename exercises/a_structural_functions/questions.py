@@ -1,6 +1,7 @@
 """Questions of set a: structural functions, by linearisation and exactly for a normal law.
 
-Answers are functions of symbols, (z, p) for the object and (m, d) for the meter; of matrices of symbols for a vector variant.
+Answers are functions of symbols, (z, p) for the object and (m, d) for the meter; of matrices of
+symbols for a vector variant.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from kfcourse.exercises.a_structural_functions.mistakes import (
 )
 from kfcourse.symbolic.sides import Side, plain
 
-Formula: TypeAlias = sp.Expr | sp.MatrixBase  # an expression for a scalar variant, a matrix for a vector one
+# an expression for a scalar variant, a matrix for a vector one
+Formula: TypeAlias = sp.Expr | sp.MatrixBase
 Make = Callable[[Exercise], Formula | tuple[Formula, ...]]  # the results in symbols
 
 
@@ -49,7 +51,8 @@ def constant(make: Make) -> ForVariant:
 
 
 def key(name: str, make: Make, side: str, step: Answer | None = None) -> ForVariant:
-    """The same for a key, with the student's own name and arguments, and the key on top of earlier answers."""
+    """The same for a key, with the student's own name and arguments, and the key on top of earlier
+    answers."""
 
     def answer(exercise: Exercise) -> Answer:
         result = make(exercise)
@@ -64,7 +67,9 @@ def right(kind: str, side: str) -> Make:
     return lambda exercise: tuple(exercise.closed(kind)[name] for name in names)
 
 
-def wrong_covariance(name: str, says: str, kind: str, side: str, covariance: Callable[[Side], sp.MatrixBase]) -> Mistake:
+def wrong_covariance(
+    name: str, says: str, kind: str, side: str, covariance: Callable[[Side], sp.MatrixBase]
+) -> Mistake:
     """The right functions but for the last, the covariance."""
 
     def make(exercise: Exercise) -> tuple:
@@ -73,12 +78,16 @@ def wrong_covariance(name: str, says: str, kind: str, side: str, covariance: Cal
     return Mistake(name, says, constant(make))
 
 
-def covariance_to_power(name: str, says: str, kind: str, side: str, exponent: sp.Rational) -> Mistake:
+def covariance_to_power(
+    name: str, says: str, kind: str, side: str, exponent: sp.Rational
+) -> Mistake:
     """The right functions with every entry of p (or d) raised to a power."""
 
     def make(exercise: Exercise) -> tuple:
         powers = {entry: entry**exponent for entry in Side.of(exercise.model, side).cov}
-        return tuple(formula.subs(powers, simultaneous=True) for formula in right(kind, side)(exercise))
+        return tuple(
+            formula.subs(powers, simultaneous=True) for formula in right(kind, side)(exercise)
+        )
 
     return Mistake(name, says, constant(make))
 
@@ -98,10 +107,18 @@ def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
     p = "p" if side == "object" else "d"
     return (
         covariance_to_power(
-            "variance-squared", f"{p} is a variance already; it seems to enter squared.", kind, side, sp.Integer(2)
+            "variance-squared",
+            f"{p} is a variance already; it seems to enter squared.",
+            kind,
+            side,
+            sp.Integer(2),
         ),
         covariance_to_power(
-            "variance-root", f"{p} is a variance; its square root seems to stand in its place.", kind, side, sp.Rational(1, 2)
+            "variance-root",
+            f"{p} is a variance; its square root seems to stand in its place.",
+            kind,
+            side,
+            sp.Rational(1, 2),
         ),
     )
 
@@ -112,7 +129,8 @@ def without_known(formula: sp.Expr, known: tuple[sp.Symbol, ...]) -> sp.Expr:
 
 
 def mistakes_of_time(kind: str, side: str) -> tuple[Mistake, ...]:
-    """Time and inputs forgotten in the mean, or taken at another step; none for a model that has none of them."""
+    """Time and inputs forgotten in the mean, or taken at another step; none for a model that has
+    none of them."""
 
     def changed(change: Callable[[Exercise, sp.Expr], sp.Expr]) -> ForVariant:
         def make(exercise: Exercise) -> tuple:
@@ -148,7 +166,8 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
         ("noise-forgotten", messages.NOISE_PART_FORGOTTEN, lambda s: s.A * s.cov * s.A.T),
         (
             "state-forgotten",
-            f"Only the noise's part is there: how does the uncertainty {p} of the state come through the equation?",
+            f"Only the noise's part is there: how does the uncertainty {p} of the state come "
+            f"through the equation?",
             lambda s: s.B * s.D * s.B.T,
         ),
         (
@@ -173,14 +192,24 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
         ),
     )
     rows = catalogue + WRONG_LINEARISED
-    named = tuple(wrong_covariance(name, says, "linearised", side, covariance) for name, says, covariance in rows)
+    named = tuple(
+        wrong_covariance(name, says, "linearised", side, covariance)
+        for name, says, covariance in rows
+    )
     exact = Mistake(
         "exact",
-        "That is the exact function of the normal law. Here the tangent takes the place of the equation.",
+        "That is the exact function of the normal law. Here the tangent takes the place of the "
+        "equation.",
         constant(right("gaussian", side)),
     )
     slopes = (wrong_slope("linearised"),) if side == "meter" else ()
-    return (*named, *mistakes_of_variance("linearised", side), *mistakes_of_time("linearised", side), exact, *slopes)
+    return (
+        *named,
+        *mistakes_of_variance("linearised", side),
+        *mistakes_of_time("linearised", side),
+        exact,
+        *slopes,
+    )
 
 
 def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
@@ -192,7 +221,8 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
         return (*functions[:-1], plain(cov + mean * mean.T))
 
     def changed(part: Callable[[Side], sp.MatrixBase], added: bool) -> ForVariant:
-        """The right functions with something in the place of the noise's part, or added to the covariance."""
+        """The right functions with something in the place of the noise's part, or added to the
+        covariance."""
 
         def make(exercise: Exercise) -> tuple:
             functions, s = right("gaussian", side)(exercise), Side.of(exercise.model, side)
@@ -208,20 +238,31 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
     slopes = (wrong_slope("gaussian"),) if side == "meter" else ()
     return (
         *slopes,
-        *(Mistake(name, says, changed(part, added=False)) for name, says, part in WRONG_NOISE_PARTS),
+        *(
+            Mistake(name, says, changed(part, added=False))
+            for name, says, part in WRONG_NOISE_PARTS
+        ),
         *(Mistake(name, says, changed(part, added=True)) for name, says, part in WRONG_STATE_PARTS),
         Mistake("correlation-forgotten", CORRELATION_FORGOTTEN, constant(uncorrelated)),
         wrong_covariance(
             "noise-not-averaged",
-            "The noise's factor is taken at the mean. It depends on the state: its square has to be averaged over the law too.",
+            "The noise's factor is taken at the mean. It depends on the state: its square has to "
+            "be averaged over the law too.",
             "gaussian",
             side,
             lambda s: s.noiseless_covariance() + s.B * s.D * s.B.T,
         ),
-        wrong_covariance("noise-forgotten", messages.NOISE_PART_FORGOTTEN, "gaussian", side, Side.noiseless_covariance),
+        wrong_covariance(
+            "noise-forgotten",
+            messages.NOISE_PART_FORGOTTEN,
+            "gaussian",
+            side,
+            Side.noiseless_covariance,
+        ),
         Mistake(
             "linearised",
-            "That is the linearised function. Here the mean over the whole normal law is asked for.",
+            "That is the linearised function. Here the mean over the whole normal law is asked "
+            "for.",
             constant(right("linearised", side)),
         ),
         Mistake("second-moment", SECOND_MOMENT, constant(second_moment)),
@@ -230,7 +271,9 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
     )
 
 
-def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)) -> ForVariant:
+def jacobians(
+    side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)
+) -> ForVariant:
     """Derivatives by state and by noise, changed."""
 
     def make(exercise: Exercise) -> tuple:
@@ -267,11 +310,22 @@ def unexplained_by(m: Formula, d: Formula) -> Formula:
     return F - G * sp.Matrix([d]) * G.T
 
 
-def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...], advice: str) -> Question:
+def _question(
+    number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...], advice: str
+) -> Question:
     """A question for the functions of one kind and one side."""
     parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
     right_one = key(f"{side}_{kind}", right(kind, side), side)
-    return Question(f"a{number}", title, "core", right_one, lambda e: [symbols(e, side)], mistakes, parts, advice=advice)
+    return Question(
+        f"a{number}",
+        title,
+        "core",
+        right_one,
+        lambda e: [symbols(e, side)],
+        mistakes,
+        parts,
+        advice=advice,
+    )
 
 
 QUESTIONS = (
@@ -284,7 +338,8 @@ QUESTIONS = (
         (
             Mistake(
                 "swapped",
-                "The two derivatives seem to be swapped: the first is by the state, the second by the noise.",
+                "The two derivatives seem to be swapped: the first is by the state, the second by "
+                "the noise.",
                 jacobians("object", lambda a, b: (b, a)),
             ),
             Mistake(
@@ -302,11 +357,16 @@ QUESTIONS = (
                 "A derivative by the noise stands in the row of another equation.",
                 jacobians("object", lambda a, b: (a, sp.Matrix(b.tolist()[::-1]))),
             ),
-            Mistake("secant", "The value was divided by the state; the derivative is asked for.", constant(_unevaluated)),
+            Mistake(
+                "secant",
+                "The value was divided by the state; the derivative is asked for.",
+                constant(_unevaluated),
+            ),
         ),
         ("a_x", "a_v"),
         advice=(
-            "Write the equation down once more, keep all letters but one constant, and differentiate by "
+            "Write the equation down once more, keep all letters but one constant, and "
+            "differentiate by "
             "that one; put the mean in last."
         ),
     ),
@@ -317,7 +377,8 @@ QUESTIONS = (
         "object",
         mistakes_of_linearised("object"),
         advice=(
-            "Write x as mean plus deviation: what multiplies the deviation, what multiplies the noise, and "
+            "Write x as mean plus deviation: what multiplies the deviation, what multiplies the "
+            "noise, and "
             "what is the variance of each?"
         ),
     ),
@@ -328,7 +389,8 @@ QUESTIONS = (
         "meter",
         mistakes_of_linearised("meter"),
         advice=(
-            "Do for the meter what you did for the object: first the value at the mean, then its slope, "
+            "Do for the meter what you did for the object: first the value at the mean, then its "
+            "slope, "
             "then what slope and noise do to a variance."
         ),
     ),
@@ -339,7 +401,8 @@ QUESTIONS = (
         "object",
         mistakes_of_gaussian("object"),
         advice=(
-            "Average over the noise first, with the state fixed; then over the state. Check with a variance "
+            "Average over the noise first, with the state fixed; then over the state. Check with "
+            "a variance "
             "of zero: what must come out?"
         ),
     ),
@@ -349,7 +412,10 @@ QUESTIONS = (
         "gaussian",
         "meter",
         mistakes_of_gaussian("meter"),
-        advice=("Check three cases by hand: no uncertainty of the state, no noise, and a meter that is a straight line."),
+        advice=(
+            "Check three cases by hand: no uncertainty of the state, no noise, and a meter that "
+            "is a straight line."
+        ),
     ),
     Question(
         "a6",
@@ -360,7 +426,8 @@ QUESTIONS = (
         (
             Mistake(
                 "whole-variance",
-                "That is the whole variance of the measurement; subtract what the best linear function of the state explains.",
+                "That is the whole variance of the measurement; subtract what the best linear "
+                "function of the state explains.",
                 constant(lambda e: right("gaussian", "meter")(e)[2]),
             ),
             Mistake(
@@ -369,14 +436,23 @@ QUESTIONS = (
                 constant(
                     lambda e: plain(
                         sp.Matrix([right("gaussian", "meter")(e)[2]])
-                        - sp.Matrix([one(sp.Matrix([right("gaussian", "meter")(e)[1]])) * Side.of(e.model, "meter").cov[0]])
+                        - sp.Matrix(
+                            [
+                                one(sp.Matrix([right("gaussian", "meter")(e)[1]]))
+                                * Side.of(e.model, "meter").cov[0]
+                            ]
+                        )
                     )
                 ),
             ),
-            *(Mistake(name, says, unexplained_with(part)) for name, says, part in WRONG_NOISE_PARTS),
+            *(
+                Mistake(name, says, unexplained_with(part))
+                for name, says, part in WRONG_NOISE_PARTS
+            ),
         ),
         advice=(
-            "Write all three functions of question 5 below each other before you subtract; what is left if "
+            "Write all three functions of question 5 below each other before you subtract; what "
+            "is left if "
             "the meter is a straight line?"
         ),
     ),
@@ -387,7 +463,8 @@ QUESTIONS = (
         ForVariant(lambda e: lambda: e.derivation.text, "derivation"),
         lambda e: [()],
         advice=(
-            "Write the line above and this line below each other, multiplied out, and cross out what both have: what is left?"
+            "Write the line above and this line below each other, multiplied out, and cross out "
+            "what both have: what is left?"
         ),
         posed=lambda e: posed_by(e.derivation.model, e.derivation.name),
     ),

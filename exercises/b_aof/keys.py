@@ -1,4 +1,5 @@
-"""Keys of set b: gain, correction, step and run of the Gaussian approximation of the absolutely optimal filter.
+"""Keys of set b: gain, correction, step and run of the Gaussian approximation of the absolutely
+optimal filter.
 
 Arrays are over an ensemble: vectors (N, n), matrices (N, r, c).
 """
@@ -25,7 +26,9 @@ def correct(lam: Array, Psi: Array, h: Array, G: Array, F: Array, y: Array) -> t
     return lam + apply(K, y - h), Psi - K @ G @ Psi
 
 
-def step(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
+def step(
+    lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable
+) -> tuple[Array, ...]:
     """z, p corrected by y, then the prediction for the next step from them."""
     h, G, F = measure(lam, Psi)
     z, p = correct(lam, Psi, h, G, F, y)
@@ -33,7 +36,8 @@ def step(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable)
 
 
 def run_filter(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
-    """Estimates z (steps, N, n) over y (steps, N, p); a trajectory whose measurement is missing keeps its prediction."""
+    """Estimates z (steps, N, n) over y (steps, N, p); a trajectory whose measurement is missing
+    keeps its prediction."""
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     estimates = []
     for k, y_k in enumerate(y):

@@ -9,18 +9,29 @@ from kfcourse.exercises.b_aof.keys import correct, covariance, gain, run_filter,
 DIVIDED = "laws.gain(Psi @ transpose(G), F)"
 WRONG_GAINS = edits(
     gain,
-    ("gain-not-divided", "The gain is not divided by the covariance F of the measurement.", DIVIDED, "Psi @ transpose(G)"),
+    (
+        "gain-not-divided",
+        "The gain is not divided by the covariance F of the measurement.",
+        DIVIDED,
+        "Psi @ transpose(G)",
+    ),
     (
         "gain-by-standard-deviation",
         "The gain is divided by a standard deviation; the variance F belongs there.",
         DIVIDED,
         "transpose(np.linalg.solve(transpose(np.linalg.cholesky(F)), G @ Psi))",
     ),
-    ("gain-without-G", "The meter's sensitivity G is missing in the gain.", DIVIDED, "laws.gain(Psi, F)"),
+    (
+        "gain-without-G",
+        "The meter's sensitivity G is missing in the gain.",
+        DIVIDED,
+        "laws.gain(Psi, F)",
+    ),
     ("gain-without-Psi", messages.GAIN_WITHOUT_PSI, "Psi @ transpose(G)", "transpose(G)"),
     (
         "gain-of-noise",
-        "The gain is divided by the noise's part only; F is the whole variance of the measurement, the state's part included.",
+        "The gain is divided by the noise's part only; F is the whole variance of the "
+        "measurement, the state's part included.",
         ", F)\n",
         ", F - G @ Psi @ transpose(G))\n",
     ),
@@ -31,7 +42,12 @@ WRONG_GAINS = edits(
         ", F)\n",
         ", F + G @ Psi @ transpose(G))\n",
     ),
-    ("first-law", "The covariances of the first trajectory are taken for all.", "(Psi @ transpose(G)", "(Psi[:1] @ transpose(G)"),
+    (
+        "first-law",
+        "The covariances of the first trajectory are taken for all.",
+        "(Psi @ transpose(G)",
+        "(Psi[:1] @ transpose(G)",
+    ),
 )
 
 WRONG_CORRECTIONS = edits(
@@ -43,11 +59,17 @@ WRONG_CORRECTIONS = edits(
     ("covariance-added", messages.COVARIANCE_ADDED, "- K @ G", "+ K @ G"),
     (
         "covariance-once",
-        "K G is a share, without units: it has to be multiplied by Psi before it is subtracted from it.",
+        "K G is a share, without units: it has to be multiplied by Psi before it is subtracted "
+        "from it.",
         "K @ G @ Psi",
         "K @ G",
     ),
-    ("covariance-of-gain", "G is missing in the covariance of the estimate.", "K @ G @ Psi", "K @ Psi"),
+    (
+        "covariance-of-gain",
+        "G is missing in the covariance of the estimate.",
+        "K @ G @ Psi",
+        "K @ Psi",
+    ),
     ("prediction-not-added", messages.CORRECTION_ALONE, "return lam + ", "return "),
 )
 
@@ -55,7 +77,8 @@ WRONG_STEPS = edits(
     step,
     (
         "beats-swapped",
-        "Prediction and correction are swapped: lam and Psi are already the prediction for this measurement.",
+        "Prediction and correction are swapped: lam and Psi are already the prediction for this "
+        "measurement.",
         "    h, G, F",
         "    lam, Psi = predict(lam, Psi)\n    h, G, F",
         "*predict(z, p)",
@@ -63,7 +86,8 @@ WRONG_STEPS = edits(
     ),
     (
         "predicted-from-prediction",
-        "The prediction starts from lam and Psi again, as if nothing had been measured; it starts from z and p.",
+        "The prediction starts from lam and Psi again, as if nothing had been measured; it starts "
+        "from z and p.",
         "predict(z, p)",
         "predict(lam, Psi)",
     ),
@@ -81,12 +105,18 @@ WRONG_STEPS = edits(
     ),
     (
         "variance-mixed",
-        "The prediction takes Psi in place of p: the uncertainty before the measurement, not after it.",
+        "The prediction takes Psi in place of p: the uncertainty before the measurement, not "
+        "after it.",
         "predict(z, p)",
         "predict(z, Psi)",
     ),
     ("covariances-added", messages.ONE_COVARIANCE_TOO_MANY, "predict(z, p)", "predict(z, Psi + p)"),
-    ("predicted-twice", "Two predictions are made; one leads to the next step.", "predict(z, p)", "predict(*predict(z, p))"),
+    (
+        "predicted-twice",
+        "Two predictions are made; one leads to the next step.",
+        "predict(z, p)",
+        "predict(*predict(z, p))",
+    ),
 )
 
 WRONG_RUNS = edits(
@@ -107,7 +137,8 @@ WRONG_RUNS = edits(
     ("missing-as-zero", messages.MISSING_AS_ZERO, "enumerate(y)", "enumerate(np.nan_to_num(y))"),
     (
         "surer-of-missing",
-        "Where a measurement is missing the estimate stays, but the covariance shrinks all the same: nothing was learnt there.",
+        "Where a measurement is missing the estimate stays, but the covariance shrinks all the "
+        "same: nothing was learnt there.",
         "np.where(missing[:, None], Psi, p)",
         "p",
     ),
@@ -119,9 +150,24 @@ WRONG_RUNS = edits(
         "at_step(measure, k), at_step(predict, k)",
         "at_wrong_step(measure, 0), at_wrong_step(predict, 0)",
     ),
-    ("input-of-next-step", messages.INPUT_OF_NEXT_STEP, "at_step(predict, k)", "at_wrong_step(predict, k + 1)"),
-    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, "at_step(measure, k)", "at_wrong_step(measure, k - 1)"),
-    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, "at_step(predict, k)", "at_wrong_step(predict, k - 1)"),
+    (
+        "input-of-next-step",
+        messages.INPUT_OF_NEXT_STEP,
+        "at_step(predict, k)",
+        "at_wrong_step(predict, k + 1)",
+    ),
+    (
+        "input-of-step-before",
+        messages.INPUT_OF_STEP_BEFORE,
+        "at_step(measure, k)",
+        "at_wrong_step(measure, k - 1)",
+    ),
+    (
+        "input-of-step-before",
+        messages.INPUT_OF_STEP_BEFORE,
+        "at_step(predict, k)",
+        "at_wrong_step(predict, k - 1)",
+    ),
     (
         "steps-from-one",
         messages.STEPS_FROM_ONE,
@@ -135,7 +181,8 @@ WRONG_COVARIANCES = edits(
     covariance,
     (
         "cancellation",
-        "On paper it is right. Where the meter is sharp it is the difference of two nearly equal numbers, and all digits "
+        "On paper it is right. Where the meter is sharp it is the difference of two nearly equal "
+        "numbers, and all digits "
         "are lost: write it as a sum or product of terms that cannot be negative.",
         f"{KEPT} + {NOISE}",
         "Psi - K @ G @ Psi",

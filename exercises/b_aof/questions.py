@@ -1,7 +1,7 @@
 """Questions of set b: the Gaussian approximation of the absolutely optimal filter, step by step.
 
-Answers are functions of arrays over an ensemble: vectors (N, n), matrices (N, r, c).  Here are the hidden arguments; the keys are
-in keys.py, the known mistakes in mistakes.py.
+Answers are functions of arrays over an ensemble: vectors (N, n), matrices (N, r, c).  Here are the
+hidden arguments; the keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -16,7 +16,13 @@ from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions
 from kfcourse.exercises.b_aof.keys import correct, covariance, gain, run_filter, step
-from kfcourse.exercises.b_aof.mistakes import WRONG_CORRECTIONS, WRONG_COVARIANCES, WRONG_GAINS, WRONG_RUNS, WRONG_STEPS
+from kfcourse.exercises.b_aof.mistakes import (
+    WRONG_CORRECTIONS,
+    WRONG_COVARIANCES,
+    WRONG_GAINS,
+    WRONG_RUNS,
+    WRONG_STEPS,
+)
 from kfcourse.exercises.shared import other_functions
 from kfcourse.laws import Array, Gaussian, Measurement, transpose
 
@@ -24,7 +30,8 @@ RUNS = 6  # hidden trajectories
 
 
 def hidden_law(exercise: Exercise, name: str) -> Gaussian:
-    """A hidden normal law for every trajectory, near the prior; correlated where the state has components."""
+    """A hidden normal law for every trajectory, near the prior; correlated where the state has
+    components."""
     rng, prior = exercise.rng(name), exercise.model.prior
     n = exercise.model.n
     scale = np.sqrt(np.diagonal(prior.cov))
@@ -64,15 +71,26 @@ def gain_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def correction_arguments(exercise: Exercise) -> list[tuple]:
-    """A hidden law, what the hidden meter makes of it, and measurements, in units in which F is neither tiny nor huge.
+    """A hidden law, what the hidden meter makes of it, and measurements, in units in which F is
+    neither tiny nor huge.
 
-    Else a gain that is not divided by F, and one that is multiplied by it, are nothing beside the state.
+    Else a gain that is not divided by F, and one that is multiplied by it, are nothing beside the
+    state.
     """
     at = hidden_law(exercise, "b2")
     expected = hidden_meter(exercise, at)
     y = hidden_measurements(exercise, "b2-y", expected)
     unit = 10.0 ** -np.round(np.log10(np.diagonal(expected.F, axis1=-2, axis2=-1).mean(axis=0)) / 2)
-    return [(at.mean, at.cov, unit * expected.h, unit[:, None] * expected.G, unit[:, None] * expected.F * unit, unit * y)]
+    return [
+        (
+            at.mean,
+            at.cov,
+            unit * expected.h,
+            unit[:, None] * expected.G,
+            unit[:, None] * expected.F * unit,
+            unit * y,
+        )
+    ]
 
 
 # -- b3: a whole step
@@ -93,9 +111,13 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
     y = exercise.simulate(runs=RUNS, steps=6, name="b4").y
     gaps = y.copy()
     gaps[2, 1] = gaps[4, :3] = np.nan
-    prior = exercise.model.prior  # not quite: where its mean is zero, or its variance one, a mistake would not show
+    # not quite: where its mean is zero, or its variance one, a mistake would not show
+    prior = exercise.model.prior
     mean, cov = prior.mean + 0.3 * np.sqrt(np.diagonal(prior.cov)), 1.3 * prior.cov
-    return [(values, mean, cov, *other_functions(exercise, *exercise.hidden_functions())) for values in (y, gaps)]
+    return [
+        (values, mean, cov, *other_functions(exercise, *exercise.hidden_functions()))
+        for values in (y, gaps)
+    ]
 
 
 # -- b5: a covariance that rounding cannot make negative
@@ -105,8 +127,12 @@ def covariance_arguments(exercise: Exercise) -> list[tuple]:
     """A usual meter, and one so sharp that a difference loses all digits."""
     at = hidden_law(exercise, "b5")
     _, G, _, R = hidden_meter(exercise, at)
-    one, sharp = np.full((RUNS, 1, 1), 0.7), np.full((RUNS, 1, 1), 1e-18)  # a scalar meter, far sharper than the prediction
-    return [(Psi, G, G @ Psi @ transpose(G) + R, R) for Psi, G, R in ((at.cov, G, R), (one, 2 * one, sharp))]
+    # a scalar meter, far sharper than the prediction
+    one, sharp = np.full((RUNS, 1, 1), 0.7), np.full((RUNS, 1, 1), 1e-18)
+    return [
+        (Psi, G, G @ Psi @ transpose(G) + R, R)
+        for Psi, G, R in ((at.cov, G, R), (one, 2 * one, sharp))
+    ]
 
 
 QUESTIONS = (
@@ -118,7 +144,8 @@ QUESTIONS = (
         gain_arguments,
         WRONG_GAINS,
         advice=(
-            "Take one trajectory with one component by hand; then look at the shapes: which product of them gives (N, n, p)?"
+            "Take one trajectory with one component by hand; then look at the shapes: which "
+            "product of them gives (N, n, p)?"
         ),
         axes=("trajectory",),
     ),
@@ -131,7 +158,8 @@ QUESTIONS = (
         WRONG_CORRECTIONS,
         ("z", "p"),
         advice=(
-            "Try two cases: a measurement that is exactly what was expected, and a meter that tells "
+            "Try two cases: a measurement that is exactly what was expected, and a meter that "
+            "tells "
             "nothing, G = 0. What must z and p be?"
         ),
         axes=("trajectory",),
@@ -144,7 +172,10 @@ QUESTIONS = (
         step_arguments,
         WRONG_STEPS,
         ("z", "p", "lam_next", "Psi_next"),
-        advice=("Write down which law each function is called with: what is known before the measurement, and what after it?"),
+        advice=(
+            "Write down which law each function is called with: what is known before the "
+            "measurement, and what after it?"
+        ),
         axes=("trajectory",),
     ),
     Question(
@@ -155,7 +186,8 @@ QUESTIONS = (
         run_arguments,
         WRONG_RUNS,
         advice=(
-            "Follow one trajectory for two steps by hand; then one whose first measurement is missing: what "
+            "Follow one trajectory for two steps by hand; then one whose first measurement is "
+            "missing: what "
             "is its estimate, and what its covariance?"
         ),
         axes=(
@@ -171,7 +203,10 @@ QUESTIONS = (
         covariance_arguments,
         WRONG_COVARIANCES,
         tolerance=1e-6,
-        advice=("Write the error of the estimate as a sum of two independent parts; each has a covariance of the form M C M^T."),
+        advice=(
+            "Write the error of the estimate as a sum of two independent parts; each has a "
+            "covariance of the form M C M^T."
+        ),
         axes=("trajectory",),
     ),
 )

@@ -19,7 +19,9 @@ def structure(lam: Array, z: Array, y: Array, a: Callable, b: Callable) -> tuple
     return y - b(lam), a(z)
 
 
-def design_step(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
+def design_step(
+    lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: Callable
+) -> tuple[Array, Array]:
     """z and lam of the next step: the error regressed on omega, the next state on alpha."""
     omega = y - b(lam)
     H, e, _ = regression(x - lam, omega)
@@ -29,7 +31,9 @@ def design_step(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: C
     return z, alpha @ F.T + g
 
 
-def design_and_run(x: Array, y_design: Array, y: Array, mean: Array, a: Callable, b: Callable) -> Array:
+def design_and_run(
+    x: Array, y_design: Array, y: Array, mean: Array, a: Callable, b: Callable
+) -> Array:
     """Estimates from `y` with coefficients found on x and y_design, step by step."""
     lam, other = np.tile(mean, (x.shape[1], 1)), np.tile(mean, (y.shape[1], 1))
     estimates = []

@@ -1,7 +1,8 @@
-"""Questions of set c: Pugachev's two-step conditionally optimal filter (DUOF), its coefficients regressions over an ensemble.
+"""Questions of set c: Pugachev's two-step conditionally optimal filter (DUOF), its coefficients
+regressions over an ensemble.
 
-Answers are functions of arrays: vectors of N trajectories (N, n), matrices (r, c), covariances (n, n).  Here are the hidden
-arguments; the keys are in keys.py, the known mistakes in mistakes.py.
+Answers are functions of arrays: vectors of N trajectories (N, n), matrices (r, c), covariances (n,
+n).  Here are the hidden arguments; the keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -16,7 +17,12 @@ from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, Function, at_step, of_steps
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
-from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
+from kfcourse.exercises.c_duof.mistakes import (
+    WRONG_DUOF_RUNS,
+    WRONG_DUOF_STEPS,
+    WRONG_REGRESSIONS,
+    WRONG_STRUCTURES,
+)
 from kfcourse.exercises.shared import RUNS, ensemble, other_equations, predicted, regression
 
 
@@ -32,7 +38,9 @@ def noiseless(exercise: Exercise) -> tuple[Callable, Callable]:
 def structure_arguments(exercise: Exercise) -> list[tuple]:
     """Predictions, estimates and measurements at one step."""
     x, y, _ = ensemble(exercise, "c1")
-    return [(predicted(exercise, "c1-lam", x), predicted(exercise, "c1-z", x), y, *noiseless(exercise))]
+    return [
+        (predicted(exercise, "c1-lam", x), predicted(exercise, "c1-z", x), y, *noiseless(exercise))
+    ]
 
 
 # -- c2: regression over the ensemble
@@ -44,7 +52,8 @@ def regression_arguments(exercise: Exercise) -> list[tuple]:
     n, p = exercise.model.n, exercise.model.p
     regressor = 0.7 + rng.normal(size=(RUNS, p))
     target = regressor @ rng.normal(size=(p, n)) + 1.3 + 0.5 * rng.normal(size=(RUNS, n))
-    constant = np.concatenate([regressor, np.full((RUNS, 1), 2.0)], axis=1)  # a component that never varies
+    # a component that never varies
+    constant = np.concatenate([regressor, np.full((RUNS, 1), 2.0)], axis=1)
     return [(target, regressor), (target, constant)]
 
 
@@ -61,8 +70,11 @@ def duof_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def bent(function: Function) -> Function:
-    """The function of x and k, bent otherwise at every step: the offsets would make good an added input of a wrong step."""
-    return of_steps(lambda x, k: function(x, k) + np.sin(1.7 * k + 0.6) * np.sin(x).sum(axis=-1, keepdims=True))
+    """The function of x and k, bent otherwise at every step: the offsets would make good an added
+    input of a wrong step."""
+    return of_steps(
+        lambda x, k: function(x, k) + np.sin(1.7 * k + 0.6) * np.sin(x).sum(axis=-1, keepdims=True)
+    )
 
 
 def duof_run_arguments(exercise: Exercise) -> list[tuple]:
@@ -71,7 +83,15 @@ def duof_run_arguments(exercise: Exercise) -> list[tuple]:
     functions = other_equations(exercise, *exercise.hidden_noiseless)
     prior = exercise.model.prior  # not quite: where its mean is zero, a start at zero would pass
     mean = prior.mean + 0.4 * np.sqrt(np.diagonal(prior.cov))
-    return [(x, y, exercise.simulate(5, 4, "c4").y, mean, *(map(bent, functions) if exercise.model.timed else functions))]
+    return [
+        (
+            x,
+            y,
+            exercise.simulate(5, 4, "c4").y,
+            mean,
+            *(map(bent, functions) if exercise.model.timed else functions),
+        )
+    ]
 
 
 QUESTIONS = (
@@ -84,7 +104,8 @@ QUESTIONS = (
         WRONG_STRUCTURES,
         ("omega", "alpha"),
         advice=(
-            "One of the two results is about the measurement of this step, the other about the next state: "
+            "One of the two results is about the measurement of this step, the other about the "
+            "next state: "
             "from what is each known?"
         ),
         axes=("trajectory",),
@@ -97,7 +118,10 @@ QUESTIONS = (
         regression_arguments,
         WRONG_REGRESSIONS,
         ("matrix", "offset", "residual"),
-        advice=("Try a target that is exactly an affine function of the regressor: what must the three results be?"),
+        advice=(
+            "Try a target that is exactly an affine function of the regressor: what must the "
+            "three results be?"
+        ),
     ),
     Question(
         "c3",
@@ -108,7 +132,8 @@ QUESTIONS = (
         WRONG_DUOF_STEPS,
         ("z", "lam_next"),
         advice=(
-            "Say for each regression what is to be estimated, and from what; then put the regression's "
+            "Say for each regression what is to be estimated, and from what; then put the "
+            "regression's "
             "result where the formula of the filter has it."
         ),
         axes=("trajectory",),
@@ -121,7 +146,8 @@ QUESTIONS = (
         duof_run_arguments,
         WRONG_DUOF_RUNS,
         advice=(
-            "Two ensembles go through the same steps: only one of them has known states, and both use the same coefficients."
+            "Two ensembles go through the same steps: only one of them has known states, and both "
+            "use the same coefficients."
         ),
         axes=(
             "step",
@@ -130,4 +156,10 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("c", "The two-step conditionally optimal filter", Path(__file__).parent, QUESTIONS, chapters=("lab-filters",))
+SET = ExerciseSet(
+    "c",
+    "The two-step conditionally optimal filter",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("lab-filters",),
+)

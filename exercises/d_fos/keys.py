@@ -1,4 +1,5 @@
-"""Keys of set d: what an estimate says of the state, and a step of the filters of optimal structure (FOS, MFOS)."""
+"""Keys of set d: what an estimate says of the state, and a step of the filters of optimal structure
+(FOS, MFOS)."""
 
 from __future__ import annotations
 
@@ -18,7 +19,9 @@ def condition(x: Array, z: Array) -> tuple[Array, Array]:
     return z @ Gamma.T + chi, T
 
 
-def fos_step(lam: Array, Psi: Array, x: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
+def fos_step(
+    lam: Array, Psi: Array, x: Array, y: Array, measure: Callable, predict: Callable
+) -> tuple[Array, ...]:
     """The AOF's z, then the prediction from what z says of the state: u and T."""
     h, G, F = measure(lam, Psi)
     aof = correct(lam, Psi, h, G, F, y)

@@ -7,10 +7,17 @@ from kfcourse.exercises import messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.shared import MOMENTS, OFFSET
 
-ESTIMATE_ITSELF = "u is not z itself: the estimate's scale and bias are corrected by the regression."
-PREDICTED_AS_AOF = "That is the AOF's prediction, from z and p; the FOS carries no covariance: it predicts from u and T."
+ESTIMATE_ITSELF = (
+    "u is not z itself: the estimate's scale and bias are corrected by the regression."
+)
+PREDICTED_AS_AOF = (
+    "That is the AOF's prediction, from z and p; the FOS carries no covariance: it "
+    "predicts from u and T."
+)
 MEAN_FROM_ESTIMATE = "The prediction's mean starts from u, not from z."
-VARIANCE_FROM_PREDICTION = "The uncertainty Psi from before the measurement is carried on; it is T after it."
+VARIANCE_FROM_PREDICTION = (
+    "The uncertainty Psi from before the measurement is carried on; it is T after it."
+)
 ERROR = "(x - z).T @ (x - z) / len(x)"
 
 WRONG_CONDITIONS = edits(
@@ -34,10 +41,16 @@ WRONG_CONDITIONS = edits(
     ("means-not-subtracted", messages.MEANS_NOT_SUBTRACTED, *MOMENTS),
     (
         "offset-forgotten",
-        "The offset chi is the state's mean; what Gamma makes of the estimate's mean has to be subtracted.",
+        "The offset chi is the state's mean; what Gamma makes of the estimate's mean has to be "
+        "subtracted.",
         *OFFSET,
     ),
-    ("unbiased-residual", messages.UNBIASED_RESIDUAL, "+ chi, T", "+ chi, T * len(x) / (len(x) - 1)"),
+    (
+        "unbiased-residual",
+        messages.UNBIASED_RESIDUAL,
+        "+ chi, T",
+        "+ chi, T * len(x) / (len(x) - 1)",
+    ),
 )
 
 LAW = "predict(u, full(np.asarray(T), len(u)))"
@@ -53,7 +66,12 @@ WRONG_FOS_STEPS = edits(
     ),
     ("variance-from-prediction", VARIANCE_FROM_PREDICTION, LAW, "predict(u, Psi)"),
     ("innovation-sign", messages.INNOVATION_SIGN, "y - h", "h - y"),
-    ("u-returned", "z is the estimate of the correction; u is what the prediction starts from.", "return z, ", "return u, "),
+    (
+        "u-returned",
+        "z is the estimate of the correction; u is what the prediction starts from.",
+        "return z, ",
+        "return u, ",
+    ),
     (
         "state-for-u",
         "The prediction starts from the state; a filter does not know it.",
@@ -66,7 +84,8 @@ WRONG_MFOS_STEPS = edits(
     mfos_step,
     (
         "correction-not-fitted",
-        "The correction of the FOS is used as it is; the MFOS fits its size and offset over the ensemble.",
+        "The correction of the FOS is used as it is; the MFOS fits its size and offset over the "
+        "ensemble.",
         "lam + sigma @ H.T + e",
         "aof[0]",
     ),
@@ -82,7 +101,12 @@ WRONG_MFOS_STEPS = edits(
         "regression(x - lam",
         "regression(x",
     ),
-    ("variance-from-aof", "Psi for the next step is Theta(u, T), not Theta(u, p).", LAW, "predict(u, aof[1])"),
+    (
+        "variance-from-aof",
+        "Psi for the next step is Theta(u, T), not Theta(u, p).",
+        LAW,
+        "predict(u, aof[1])",
+    ),
     ("mean-from-estimate", MEAN_FROM_ESTIMATE, "predict(u,", "predict(z,"),
     ("predicted-as-aof", PREDICTED_AS_AOF, LAW, "predict(z, aof[1])"),
     (
@@ -102,11 +126,22 @@ WRONG_MFOS_STEPS = edits(
 WIDE = "condition(x, np.concatenate([y, z], axis=1))"
 WRONG_BOTH = edits(
     condition_on_both,
-    ("measurement-unused", "Only the estimate is used; the measurement may tell more.", WIDE, "condition(x, z)"),
-    ("estimate-unused", "Only the measurement is used; the estimate knows the past.", WIDE, "condition(x, y)"),
+    (
+        "measurement-unused",
+        "Only the estimate is used; the measurement may tell more.",
+        WIDE,
+        "condition(x, z)",
+    ),
+    (
+        "estimate-unused",
+        "Only the measurement is used; the estimate knows the past.",
+        WIDE,
+        "condition(x, y)",
+    ),
     (
         "one-after-the-other",
-        "What the estimate leaves is fitted on the measurement afterwards; they are correlated: fit them together.",
+        "What the estimate leaves is fitted on the measurement afterwards; they are correlated: "
+        "fit them together.",
         f"return {WIDE}",
         "u, _ = condition(x, z); more, T = condition(x - u, y); return u + more, T",
     ),

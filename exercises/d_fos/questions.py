@@ -1,7 +1,9 @@
-"""Questions of set d: filters of optimal structure (FOS, MFOS), whose coefficients are regressions over an ensemble.
+"""Questions of set d: filters of optimal structure (FOS, MFOS), whose coefficients are regressions
+over an ensemble.
 
-Answers are functions of arrays: vectors of N trajectories (N, n), matrices (r, c), covariances (n, n) or (N, n, n).  Here are the
-hidden arguments; the keys are in keys.py, the known mistakes in mistakes.py.
+Answers are functions of arrays: vectors of N trajectories (N, n), matrices (r, c), covariances (n,
+n) or (N, n, n).  Here are the hidden arguments; the keys are in keys.py, the known mistakes in
+mistakes.py.
 """
 
 from __future__ import annotations
@@ -13,7 +15,12 @@ from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions, full
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
-from kfcourse.exercises.d_fos.mistakes import WRONG_BOTH, WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
+from kfcourse.exercises.d_fos.mistakes import (
+    WRONG_BOTH,
+    WRONG_CONDITIONS,
+    WRONG_FOS_STEPS,
+    WRONG_MFOS_STEPS,
+)
 from kfcourse.exercises.shared import RUNS, ensemble, other_functions, predicted, regression
 
 # -- d1: what the estimate says of the state
@@ -32,8 +39,18 @@ def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
     """Predictions, their covariances, states and measurements at one step of the design."""
     x, y, _ = ensemble(exercise, name)
     lam = predicted(exercise, f"{name}-lam", x)
-    Psi = full(regression(x - lam, 0 * x)[2], RUNS) * (1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1)))
-    return [(lam, Psi, x, y, *other_functions(exercise, *array_functions(exercise.hidden.gaussian.at(STEP))))]
+    Psi = full(regression(x - lam, 0 * x)[2], RUNS) * (
+        1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1))
+    )
+    return [
+        (
+            lam,
+            Psi,
+            x,
+            y,
+            *other_functions(exercise, *array_functions(exercise.hidden.gaussian.at(STEP))),
+        )
+    ]
 
 
 # -- d3: one step of the MFOS
@@ -65,7 +82,8 @@ QUESTIONS = (
         WRONG_CONDITIONS,
         ("u", "T"),
         advice=(
-            "The estimate is taken as any other measurement here: a regression of the state on it tells "
+            "The estimate is taken as any other measurement here: a regression of the state on it "
+            "tells "
             "both the mean and what is left."
         ),
     ),
@@ -78,7 +96,8 @@ QUESTIONS = (
         WRONG_FOS_STEPS,
         ("z", "lam_next", "Psi_next"),
         advice=(
-            "Compare with one step of the AOF line by line: the correction is the same. Which law does the "
+            "Compare with one step of the AOF line by line: the correction is the same. Which law "
+            "does the "
             "prediction begin from here?"
         ),
         axes=("trajectory",),
@@ -92,7 +111,8 @@ QUESTIONS = (
         WRONG_MFOS_STEPS,
         ("z", "lam_next", "Psi_next"),
         advice=(
-            "Count the regressions, and write target and regressor of each beside it; then check that each "
+            "Count the regressions, and write target and regressor of each beside it; then check "
+            "that each "
             "uses the newest estimate there is."
         ),
         axes=("trajectory",),
@@ -106,9 +126,12 @@ QUESTIONS = (
         WRONG_BOTH,
         ("u", "T"),
         advice=(
-            "One regression with a longer regressor. Try it with a measurement that tells nothing: question 1 must come out."
+            "One regression with a longer regressor. Try it with a measurement that tells "
+            "nothing: question 1 must come out."
         ),
     ),
 )
 
-SET = ExerciseSet("d", "Filters of optimal structure", Path(__file__).parent, QUESTIONS, chapters=("lab-filters",))
+SET = ExerciseSet(
+    "d", "Filters of optimal structure", Path(__file__).parent, QUESTIONS, chapters=("lab-filters",)
+)

@@ -34,13 +34,16 @@ def difference(x: Array, z_first: Array, z_second: Array) -> tuple[Array, Array]
 
 
 def ratio(x: Array, z_first: Array, z_second: Array) -> tuple[Array, Array]:
-    """D_k of the first over that of the second, with the standard error of a ratio of paired means."""
+    """D_k of the first over that of the second, with the standard error of a ratio of paired
+    means."""
     D, base = error_variance(x, z_first), error_variance(x, z_second)
     r = D / base
-    return r, spread_of_mean(squared_error(x, z_first) - r[:, None] * squared_error(x, z_second)) / base
+    first, second = squared_error(x, z_first), squared_error(x, z_second)
+    return r, spread_of_mean(first - r[:, None] * second) / base
 
 
 def normalised_error(x: Array, z: Array, p: Array) -> Array:
     """Mean of (x - z)^T p^-1 (x - z), over the number of components."""
     error = x - z
-    return np.mean(np.sum(error * np.linalg.solve(p, error[..., None])[..., 0], axis=2), axis=1) / x.shape[2]
+    size = np.sum(error * np.linalg.solve(p, error[..., None])[..., 0], axis=2)
+    return np.mean(size, axis=1) / x.shape[2]

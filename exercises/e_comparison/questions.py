@@ -1,7 +1,8 @@
 """Questions of set e: comparing filters by Monte Carlo, with standard errors.
 
-Answers are functions of stored trajectories: x and z are (steps, N, n), p is (steps, N, n, n); results are (steps,).  The
-hidden arguments are made here; the keys are in keys.py, the known mistakes in mistakes.py.
+Answers are functions of stored trajectories: x and z are (steps, N, n), p is (steps, N, n, n);
+results are (steps,).  The hidden arguments are made here; the keys are in keys.py, the known
+mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.e_comparison.keys import difference, error_variance, normalised_error, ratio, with_standard_error
+from kfcourse.exercises.e_comparison.keys import (
+    difference,
+    error_variance,
+    normalised_error,
+    ratio,
+    with_standard_error,
+)
 from kfcourse.exercises.e_comparison.mistakes import (
     WRONG_DIFFERENCES,
     WRONG_ERRORS,
@@ -30,24 +37,29 @@ RUNS, STEPS = 40, 5
 
 
 def hidden_estimates(exercise: Exercise, name: str) -> tuple[Array, Array, Array, Array]:
-    """States, the estimates of two filters and the first one's covariances, on common trajectories."""
+    """States, the estimates of two filters and the first one's covariances, on common
+    trajectories."""
     x, y = exercise.simulate(RUNS, STEPS, name)
     first = run(aof(exercise.given.gaussian), y)
     rng = exercise.rng(f"{name}-other")
     noise = rng.normal(size=x.shape) * x.std(axis=1, keepdims=True)
-    each = rng.uniform(0.7, 1.3, (*x.shape[:2], 1, 1))  # a linear model's filter has one covariance for all trajectories
+    # a linear model's filter has one covariance for all trajectories
+    each = rng.uniform(0.7, 1.3, (*x.shape[:2], 1, 1))
     return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], each * first.cov
 
 
 def asked(name: str, *places: int) -> Callable[[Exercise], list[tuple]]:
-    """Arguments at these places of the hidden estimates; of a scalar variant also with two components, which are correlated."""
+    """Arguments at these places of the hidden estimates; of a scalar variant also with two
+    components, which are correlated."""
 
     def arguments(exercise: Exercise) -> list[tuple]:
         one = hidden_estimates(exercise, name)
         found = [one]
         if exercise.model.n == 1:
             other = hidden_estimates(exercise, f"{name}-second")
-            x, first, second, _ = (np.concatenate(pair[:2], axis=-1) for pair in zip(one, other, strict=True))
+            x, first, second, _ = (
+                np.concatenate(pair[:2], axis=-1) for pair in zip(one, other, strict=True)
+            )
             rng = exercise.rng(f"{name}-covariance")
             roots = (np.eye(2) + 0.4 * rng.normal(size=(*x.shape, 2))) * np.abs(x - first).mean()
             found.append((x, first, second, roots @ transpose(roots)))
@@ -66,7 +78,8 @@ QUESTIONS = (
         error_variance,
         asked("e1", 0, 1),
         WRONG_VARIANCES,
-        advice="Look at the axes: over which of them is a sum taken, over which a mean, and which one is left?",
+        advice="Look at the axes: over which of them is a sum taken, over which a mean, and which "
+        "one is left?",
         axes=("step",),
     ),
     Question(
@@ -78,7 +91,8 @@ QUESTIONS = (
         WRONG_ERRORS,
         TWO,
         advice=(
-            "The standard error belongs to a mean of N numbers. Which numbers, how much do they scatter, "
+            "The standard error belongs to a mean of N numbers. Which numbers, how much do they "
+            "scatter, "
             "and how does a mean of N scatter?"
         ),
         axes=("step",),
@@ -91,7 +105,10 @@ QUESTIONS = (
         asked("e3", 0, 1, 2),
         WRONG_DIFFERENCES,
         TWO,
-        advice=("Make one number of each trajectory that holds all you want to average; then question 2 applies to it."),
+        advice=(
+            "Make one number of each trajectory that holds all you want to average; then question "
+            "2 applies to it."
+        ),
         axes=("step",),
     ),
     Question(
@@ -103,7 +120,8 @@ QUESTIONS = (
         WRONG_RATIOS,
         TWO,
         advice=(
-            "Change the mean above a little, then the mean below: how does the ratio change? Keep each "
+            "Change the mean above a little, then the mean below: how does the ratio change? Keep "
+            "each "
             "trajectory's two changes together."
         ),
         axes=("step",),
@@ -116,11 +134,19 @@ QUESTIONS = (
         asked("e5", 0, 1, 3),
         WRONG_NORMALISED,
         advice=(
-            "Take one trajectory at one step: a vector, a matrix and a number. Then average the numbers "
+            "Take one trajectory at one step: a vector, a matrix and a number. Then average the "
+            "numbers "
             "over the trajectories, and look at the 1/n."
         ),
         axes=("step",),
     ),
 )
 
-SET = ExerciseSet("e", "Comparison by Monte Carlo", Path(__file__).parent, QUESTIONS, chapters=("comparison",), angles=("y",))
+SET = ExerciseSet(
+    "e",
+    "Comparison by Monte Carlo",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("comparison",),
+    angles=("y",),
+)

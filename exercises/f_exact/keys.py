@@ -1,4 +1,5 @@
-"""Keys of set f: moments, correction and prediction of a density at nodes, a run, and how many nodes are needed."""
+"""Keys of set f: moments, correction and prediction of a density at nodes, a run, and how many
+nodes are needed."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ def correct(predicted: Array, y: float, x: Array, see: Law) -> tuple[Array, Arra
 
 
 def predict(posterior: Array, x: Array, move: Law) -> Array:
-    """The transition density integrated over the posterior; P[i, j] leads from node j to node i, (M, M)."""
+    """The transition density integrated over the posterior; P[i, j] leads from node j to node i,
+    (M, M)."""
     h, (mean, variance) = x[1] - x[0], move(x)
     P = normal(x[:, None], mean, variance)
     return h * P @ posterior
@@ -50,6 +52,7 @@ def run_filter(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[A
 
 
 def nodes_needed(low: float, high: float, sigma: float, error: float) -> Array:
-    """Nodes from low to high so that the rule's error, 2 exp(-2 (pi sigma/h)^2), is at most `error`."""
+    """Nodes from low to high so that the rule's error, 2 exp(-2 (pi sigma/h)^2), is at most
+    `error`."""
     step = np.pi * sigma * np.sqrt(2 / np.log(2 / error))
     return np.asarray(np.ceil((high - low) / step) + 1)

@@ -19,7 +19,8 @@ WRONG_MOMENTS = edits(
     ),
     (
         "step-forgotten",
-        "The values at the nodes add up to one. It is the integral that is one; the step of the grid is missing.",
+        "The values at the nodes add up to one. It is the integral that is one; the step of the "
+        "grid is missing.",
         "return q,",
         "return density / density.sum(),",
     ),
@@ -68,13 +69,15 @@ KERNELS = (
     ),
     (
         "variance-for-deviation",
-        "A variance stands where the standard deviation belongs: the scale of scipy's norm is a standard deviation.",
+        "A variance stands where the standard deviation belongs: the scale of scipy's norm is a "
+        "standard deviation.",
         "    return np.exp",
         "    variance = variance**2; return np.exp",
     ),
     (
         "factor-forgotten",
-        "The factor before the exponential is missing in the normal density; it matters, as the variance depends on the state.",
+        "The factor before the exponential is missing in the normal density; it matters, as the "
+        "variance depends on the state.",
         " / np.sqrt(2 * np.pi * variance)",
         "",
     ),
@@ -86,7 +89,8 @@ KERNELS = (
     ),
     (
         "half-a-factor",
-        "The factor before the exponential is not complete: the variance depends on the state, and belongs there too.",
+        "The factor before the exponential is not complete: the variance depends on the state, "
+        "and belongs there too.",
         "np.sqrt(2 * np.pi * variance)",
         "np.sqrt(2 * np.pi)",
     ),
@@ -114,13 +118,15 @@ WRONG_CORRECTIONS = edits(
     ),
     (
         "constant-inverted",
-        "You return the constant C itself; its inverse, the density of the measurement, is asked for.",
+        "You return the constant C itself; its inverse, the density of the measurement, is asked "
+        "for.",
         "evidence, evidence\n",
         "evidence, 1 / evidence\n",
     ),
     (
         "signal-forgotten",
-        "The measurement is compared with the state itself; its mean is what the meter makes of the state.",
+        "The measurement is compared with the state itself; its mean is what the meter makes of "
+        "the state.",
         "*see(x)",
         "x, see(x)[1]",
     ),
@@ -128,31 +134,38 @@ WRONG_CORRECTIONS = edits(
 
 # -- f3: the prediction
 
-NORMAL_PREDICTION = "A normal density takes the place of the integral; the law after a step is as a rule not normal."
+NORMAL_PREDICTION = (
+    "A normal density takes the place of the integral; the law after a step is as "
+    "a rule not normal."
+)
 WRONG_PREDICTIONS = edits(
     predict,
     *KERNELS[:3],
     (
         "normalised",
-        "The result is normalised; a prediction loses the mass that leaves the grid, and that should be seen.",
+        "The result is normalised; a prediction loses the mass that leaves the grid, and that "
+        "should be seen.",
         "return h * P @ posterior",
         "return P @ posterior / (h * (P @ posterior).sum())",
     ),
     (
         "transposed",
-        "The matrix is transposed: the sum runs over the state after the step. Integrate over the state before it.",
+        "The matrix is transposed: the sum runs over the state after the step. Integrate over the "
+        "state before it.",
         "P @ posterior",
         "P.T @ posterior",
     ),
     (
         "posterior-ignored",
-        "The transition density is integrated alone; weigh it by the posterior density of the state before the step.",
+        "The transition density is integrated alone; weigh it by the posterior density of the "
+        "state before the step.",
         "P @ posterior",
         "P.sum(axis=1)",
     ),
     (
         "variance-of-target",
-        "The variance of the step is taken at the state after it; it belongs to the state before it.",
+        "The variance of the step is taken at the state after it; it belongs to the state before "
+        "it.",
         "mean, variance)\n    return",
         "mean, variance[:, None])\n    return",
     ),
@@ -166,7 +179,8 @@ WRONG_PREDICTIONS = edits(
         "normal-prediction",
         NORMAL_PREDICTION,
         "return h * P @ posterior",
-        "z = h * mean @ posterior; return normal(x, z, h * (variance + mean**2) @ posterior - z**2)",
+        "z = h * mean @ posterior; return normal(x, z, h * (variance + mean**2) @ posterior - "
+        "z**2)",
     ),
 )
 
@@ -177,13 +191,15 @@ WRONG_RUNS = edits(
     ("predicted-first", messages.PREDICTED_FIRST, "= prior, []", "= predict(prior, x, move), []"),
     (
         "prior-again",
-        "Every step starts from the prior again, as if nothing had been measured before: hand the prediction on.",
+        "Every step starts from the prior again, as if nothing had been measured before: hand the "
+        "prediction on.",
         "predicted = predict(q, x, move)",
         "predicted = prior",
     ),
     (
         "not-predicted",
-        "The posterior is corrected again without a prediction: the object moves between two measurements.",
+        "The posterior is corrected again without a prediction: the object moves between two "
+        "measurements.",
         "predicted = predict(q, x, move)",
         "predicted = q",
     ),
@@ -225,8 +241,18 @@ WRONG_NODES = edits(
         "np.ceil",
         "np.floor",
     ),
-    ("variance", "A variance stands where the standard deviation belongs.", "sigma * np", "sigma**2 * np"),
-    ("factor-before", "The factor 2 before the exponential is missing.", "np.log(2 /", "np.log(1 /"),
+    (
+        "variance",
+        "A variance stands where the standard deviation belongs.",
+        "sigma * np",
+        "sigma**2 * np",
+    ),
+    (
+        "factor-before",
+        "The factor 2 before the exponential is missing.",
+        "np.log(2 /",
+        "np.log(1 /",
+    ),
     ("factor-inside", "The factor 2 in the exponent is missing.", "np.sqrt(2 /", "np.sqrt(1 /"),
     ("decimal-logarithm", messages.DECIMAL_LOGARITHM, "np.log", "np.log10"),
     (

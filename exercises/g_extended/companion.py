@@ -18,10 +18,12 @@ Map = Callable[[Array], Array]
 
 
 class Functions(NamedTuple):
-    """The lecture's x_{k+1} = f(x) + g(x) xi, y = S(x) + n with their Jacobians, as functions of arrays x (..., n).
+    """The lecture's x_{k+1} = f(x) + g(x) xi, y = S(x) + n with their Jacobians, as functions of
+    arrays x (..., n).
 
     f (..., n), Phi = df/dx (..., n, n), g (..., n, r), covariance D_xi (r, r) of xi;
-    S (..., p), H = dS/dx (..., p, n), covariance D_n (..., p, p) of n, which may depend on the state.
+    S (..., p), H = dS/dx (..., p, n), covariance D_n (..., p, p) of n, which may depend on the
+    state.
     """
 
     f: Map
@@ -34,12 +36,14 @@ class Functions(NamedTuple):
 
 
 def of_all_steps(function: Callable[[Array, int], Array], first: int = 0) -> Map:
-    """A function of x and k as one of arrays with all steps before the other axes, (steps, N, n), from step `first` on."""
+    """A function of x and k as one of arrays with all steps before the other axes, (steps, N, n),
+    from step `first` on."""
     return lambda x: np.array([function(x_k, first + k) for k, x_k in enumerate(x)])
 
 
 def linearisation(model: Model) -> Functions:
-    """f, Phi, g, D_xi, S, H, D_n of a model: its equations with the noises at their means, differentiated by state and noises.
+    """f, Phi, g, D_xi, S, H, D_n of a model: its equations with the noises at their means,
+    differentiated by state and noises.
 
     Where the model depends on the step, the functions take it: f(x, k).
     """

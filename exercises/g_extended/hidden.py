@@ -1,6 +1,8 @@
-"""Hidden smooth functions with their Jacobians, and hidden laws, in dimensions of the variant and in others.
+"""Hidden smooth functions with their Jacobians, and hidden laws, in dimensions of the variant and
+in others.
 
-Where the variant's own Jacobian is constant, or has one entry, one taken at a wrong point, or transposed, would pass.
+Where the variant's own Jacobian is constant, or has one entry, one taken at a wrong point, or
+transposed, would pass.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ DIMENSIONS = (3, 3, 2)  # states, noises of the object, measurements: besides th
 
 
 def curved(rng: np.random.Generator, rows: int, n: int, size: float) -> tuple[Map, Map]:
-    """A smooth function (..., n) -> (..., rows), about `size` times its argument, and its Jacobian (..., rows, n)."""
+    """A smooth function (..., n) -> (..., rows), about `size` times its argument, and its Jacobian
+    (..., rows, n)."""
     A, B = (factor * size * rng.normal(size=(rows, n)) / np.sqrt(n) for factor in (0.7, 1.0))
     A[:, 0] += 0.5 * size * np.sign(A[:, 0])  # nothing near zero where there is but one entry
     B += 0.3 * size * np.sign(B)
@@ -42,7 +45,9 @@ def hidden_functions(exercise: Exercise, name: str, n: int, r: int, p: int) -> F
     f, Phi = curved(rng, n, n, 0.7)
     S, H = curved(rng, p, n, 1.2)
     g = varying(rng, 0.3 + 0.6 * rng.uniform(size=(n, r)) + np.eye(n, r), n)
-    return Functions(f, Phi, g, covariance(rng, r, 0.2), S, H, varying(rng, covariance(rng, p, 0.3), n))
+    return Functions(
+        f, Phi, g, covariance(rng, r, 0.2), S, H, varying(rng, covariance(rng, p, 0.3), n)
+    )
 
 
 def changing(one: Functions) -> Functions:
@@ -52,7 +57,9 @@ def changing(one: Functions) -> Functions:
         return of_steps(lambda x, k: (1 + 0.3 * np.sin(1.7 * k + phase)) * function(x))
 
     phases = {"f": 0.4, "Phi": 0.4, "g": 1.1, "S": 2.0, "H": 2.0, "D_n": 2.9}
-    return one._replace(**{name: times(getattr(one, name), phase) for name, phase in phases.items()})
+    return one._replace(
+        **{name: times(getattr(one, name), phase) for name, phase in phases.items()}
+    )
 
 
 def sizes(exercise: Exercise) -> tuple[tuple[int, int, int], ...]:
@@ -62,7 +69,9 @@ def sizes(exercise: Exercise) -> tuple[tuple[int, int, int], ...]:
 
 def hidden_law(rng: np.random.Generator, n: int) -> Gaussian:
     """A normal law for every trajectory."""
-    return Gaussian(rng.normal(size=(RUNS, n)), np.array([covariance(rng, n, 0.4) for _ in range(RUNS)]))
+    return Gaussian(
+        rng.normal(size=(RUNS, n)), np.array([covariance(rng, n, 0.4) for _ in range(RUNS)])
+    )
 
 
 def cases(exercise: Exercise, name: str) -> list[tuple[Functions, np.random.Generator, int, int]]:

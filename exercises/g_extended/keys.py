@@ -1,4 +1,5 @@
-"""Keys of set g: Jacobian, prediction, correction and run of the extended filter, information form, NEES and NIS."""
+"""Keys of set g: Jacobian, prediction, correction and run of the extended filter, information form,
+NEES and NIS."""
 
 from __future__ import annotations
 
@@ -38,7 +39,18 @@ def correct(lam: Array, Psi: Array, y: Array, S: Map, H: Map, D_n: Map) -> tuple
     return lam + apply(K, y - S(lam)), Psi - K @ G @ Psi
 
 
-def run_filter(y: Array, mean: Array, cov: Array, f: Map, Phi: Map, g: Map, D_xi: Array, S: Map, H: Map, D_n: Map) -> Run:
+def run_filter(
+    y: Array,
+    mean: Array,
+    cov: Array,
+    f: Map,
+    Phi: Map,
+    g: Map,
+    D_xi: Array,
+    S: Map,
+    H: Map,
+    D_n: Map,
+) -> Run:
     """z, p, lam, Psi of all steps."""
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     history = []
@@ -56,7 +68,9 @@ def square(vector: Array, cov: Array) -> Array:
     return np.sum(vector * np.linalg.solve(cov, vector[..., None])[..., 0], axis=-1)
 
 
-def consistency(x: Array, z: Array, p: Array, y: Array, lam: Array, Psi: Array, S: Map, H: Map, D_n: Map) -> tuple[Array, Array]:
+def consistency(
+    x: Array, z: Array, p: Array, y: Array, lam: Array, Psi: Array, S: Map, H: Map, D_n: Map
+) -> tuple[Array, Array]:
     """NEES and NIS, each the mean over trajectories."""
     G, R = H(lam), D_n(lam)
     F = G @ Psi @ transpose(G) + R

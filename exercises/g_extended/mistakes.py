@@ -4,14 +4,34 @@ from __future__ import annotations
 
 from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
-from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
+from kfcourse.exercises.g_extended.keys import (
+    bounds,
+    consistency,
+    correct,
+    information,
+    jacobian,
+    predict,
+    run_filter,
+)
 
 # -- g1: a Jacobian by differences; g2: bounds
 
 WRONG_JACOBIANS = edits(
     jacobian,
-    ("one-sided", messages.ONE_SIDED_DIFFERENCE, "function(x - h * e)) / (2 * h)", "function(x)) / h"),
-    ("one-sided", messages.ONE_SIDED_DIFFERENCE, "(function(x + h * e)", "(function(x)", "(2 * h)", "h"),
+    (
+        "one-sided",
+        messages.ONE_SIDED_DIFFERENCE,
+        "function(x - h * e)) / (2 * h)",
+        "function(x)) / h",
+    ),
+    (
+        "one-sided",
+        messages.ONE_SIDED_DIFFERENCE,
+        "(function(x + h * e)",
+        "(function(x)",
+        "(2 * h)",
+        "h",
+    ),
     ("divided-by-one-step", "The two points are two steps apart.", "(2 * h)", "h"),
     (
         "all-at-once",
@@ -19,7 +39,12 @@ WRONG_JACOBIANS = edits(
         "for e in np.eye(x.shape[-1])",
         "for e in np.ones((x.shape[-1], 1))",
     ),
-    ("multiplied-by-step", "The distance of the points multiplies; it divides.", "/ (2 * h)", "* 2 * h"),
+    (
+        "multiplied-by-step",
+        "The distance of the points multiplies; it divides.",
+        "/ (2 * h)",
+        "* 2 * h",
+    ),
     (
         "half-step",
         "The points are half a step away; take a whole step to either side.",
@@ -38,7 +63,8 @@ WRONG_BOUNDS = edits(
     bounds,
     (
         "one-value",
-        "These are the bounds of a single value. The mean of many runs varies less: the degrees of freedom of a sum add up.",
+        "These are the bounds of a single value. The mean of many runs varies less: the degrees "
+        "of freedom of a sum add up.",
         "    total",
         "    runs = 1; total",
     ),
@@ -50,7 +76,8 @@ WRONG_BOUNDS = edits(
     ),
     (
         "runs-only",
-        "The degrees of freedom are not only the number of runs: each run adds as many as the vector has components.",
+        "The degrees of freedom are not only the number of runs: each run adds as many as the "
+        "vector has components.",
         "degrees * runs",
         "runs",
     ),
@@ -68,11 +95,17 @@ WRONG_BOUNDS = edits(
     ),
     (
         "one-sided",
-        "Each bound leaves out the whole of the small probability; both together may leave it out, one half each.",
+        "Each bound leaves out the whole of the small probability; both together may leave it "
+        "out, one half each.",
         "(1 - confidence) / 2",
         "1 - confidence",
     ),
-    ("half-confidence", "Halve what lies outside, not the confidence.", "(1 - confidence) / 2", "confidence / 2"),
+    (
+        "half-confidence",
+        "Halve what lies outside, not the confidence.",
+        "(1 - confidence) / 2",
+        "confidence / 2",
+    ),
     (
         "normal",
         "That is the normal approximation; the chi-squared law itself is not symmetric.",
@@ -94,13 +127,15 @@ WRONG_PREDICTIONS = edits(
     predict,
     (
         "jacobian-at-prediction",
-        "The Jacobian is taken at the prediction; the function is expanded where the state is believed to be, at the estimate.",
+        "The Jacobian is taken at the prediction; the function is expanded where the state is "
+        "believed to be, at the estimate.",
         "Phi(z)",
         "Phi(f(z))",
     ),
     (
         "noise-at-prediction",
-        "The factor of the noise is taken at the prediction; the noise acts on the state before the step.",
+        "The factor of the noise is taken at the prediction; the noise acts on the state before "
+        "the step.",
         " g(z)",
         " g(f(z))",
     ),
@@ -112,11 +147,17 @@ WRONG_PREDICTIONS = edits(
     ),
     (
         "noise-forgotten",
-        "The noise of the object is not added: a filter that believes its object to be undisturbed stops learning.",
+        "The noise of the object is not added: a filter that believes its object to be "
+        "undisturbed stops learning.",
         " + B @ D_xi @ transpose(B)",
         "",
     ),
-    ("factor-forgotten", "The covariance of the noise is added without its factor g.", "B @ D_xi @ transpose(B)", "D_xi"),
+    (
+        "factor-forgotten",
+        "The covariance of the noise is added without its factor g.",
+        "B @ D_xi @ transpose(B)",
+        "D_xi",
+    ),
     (
         "noise-covariance-forgotten",
         "The covariance of the noise is missing between its factors.",
@@ -131,7 +172,8 @@ WRONG_PREDICTIONS = edits(
     ),
     (
         "mean-by-jacobian",
-        "The estimate is multiplied by the Jacobian; the prediction is the function itself at the estimate.",
+        "The estimate is multiplied by the Jacobian; the prediction is the function itself at the "
+        "estimate.",
         "return f(z)",
         "return apply(A, z)",
     ),
@@ -144,13 +186,15 @@ WRONG_CORRECTIONS = edits(
     correct,
     (
         "noise-of-meter-forgotten",
-        "The noise of the meter is missing in the covariance that the gain is divided by: the meter is taken as perfect.",
+        "The noise of the meter is missing in the covariance that the gain is divided by: the "
+        "meter is taken as perfect.",
         " + R",
         "",
     ),
     (
         "forms-mixed",
-        "That gain puts the covariance of the prediction into the information form's formula, which has that of the estimate.",
+        "That gain puts the covariance of the prediction into the information form's formula, "
+        "which has that of the estimate.",
         "G @ Psi @ transpose(G) + R",
         "R",
     ),
@@ -163,7 +207,8 @@ WRONG_CORRECTIONS = edits(
     ),
     (
         "expected-by-jacobian",
-        "The prediction is multiplied by the Jacobian; what is expected of y is the signal itself at the prediction.",
+        "The prediction is multiplied by the Jacobian; what is expected of y is the signal itself "
+        "at the prediction.",
         "y - S(lam)",
         "y - apply(G, lam)",
     ),
@@ -181,17 +226,20 @@ WRONG_RUNS = edits(
         "predicted-first",
         messages.PREDICTED_FIRST,
         "    history = []",
-        "    history = []\n    lam, Psi = predict(lam, Psi, at_step(f, 0), at_step(Phi, 0), at_step(g, 0), D_xi)",
+        "    history = []\n    lam, Psi = predict(lam, Psi, at_step(f, 0), at_step(Phi, 0), "
+        "at_step(g, 0), D_xi)",
     ),
     (
         "meter-jacobian-at-old-estimate",
-        "The Jacobian of the meter is taken at the last estimate; the object has moved since: expand around the prediction.",
+        "The Jacobian of the meter is taken at the last estimate; the object has moved since: "
+        "expand around the prediction.",
         "y_k, S_k, H_k, D_k",
         "y_k, S_k, (lambda _, at=z if k else lam, H_k=H_k: H_k(at)), D_k",
     ),
     (
         "object-jacobian-at-prediction",
-        "The Jacobian of the object is taken at the prediction for y_k; after the correction the estimate is the better place.",
+        "The Jacobian of the object is taken at the prediction for y_k; after the correction the "
+        "estimate is the better place.",
         "f_k, Phi_k, g_k, D_xi",
         "f_k, (lambda _, at=lam, Phi_k=Phi_k: Phi_k(at)), g_k, D_xi",
     ),
@@ -203,13 +251,15 @@ WRONG_RUNS = edits(
     ),
     (
         "covariance-not-predicted",
-        "The gain is made of the covariance of the last estimate; it needs that of the prediction, after the object has moved.",
+        "The gain is made of the covariance of the last estimate; it needs that of the "
+        "prediction, after the object has moved.",
         "lam, Psi = predict(z, p, f_k, Phi_k, g_k, D_xi)",
         "lam, Psi = f_k(z), p",
     ),
     (
         "predictions-for-estimates",
-        "The first two results are the predictions, before each measurement; return the estimates, after it.",
+        "The first two results are the predictions, before each measurement; return the "
+        "estimates, after it.",
         "append((z, p, lam, Psi))",
         "append((lam, Psi, lam, Psi))",
     ),
@@ -248,16 +298,23 @@ WRONG_RUNS = edits(
 
 WRONG_NORMALISED = edits(
     consistency,
-    ("inverse-forgotten", messages.INVERSE_FORGOTTEN, "np.linalg.solve(cov, vector[..., None])", "(cov @ vector[..., None])"),
+    (
+        "inverse-forgotten",
+        messages.INVERSE_FORGOTTEN,
+        "np.linalg.solve(cov, vector[..., None])",
+        "(cov @ vector[..., None])",
+    ),
     (
         "noise-for-innovation",
-        "The innovation is compared with the noise of the meter alone; its covariance has the part of the state too.",
+        "The innovation is compared with the noise of the meter alone; its covariance has the "
+        "part of the state too.",
         "F = G @ Psi @ transpose(G) + R",
         "F = R",
     ),
     (
         "residual-for-innovation",
-        "The measurement is compared with the estimate, which knows it already; an innovation is taken from the prediction.",
+        "The measurement is compared with the estimate, which knows it already; an innovation is "
+        "taken from the prediction.",
         "y - S(lam)",
         "y - S(z)",
     ),
@@ -289,17 +346,24 @@ WRONG_NORMALISED = edits(
 
 WRONG_INFORMATION = edits(
     information,
-    ("inverse-forgotten", messages.INFORMATION_FOR_COVARIANCE, "p = np.linalg.inv(total)", "p = total"),
+    (
+        "inverse-forgotten",
+        messages.INFORMATION_FOR_COVARIANCE,
+        "p = np.linalg.inv(total)",
+        "p = total",
+    ),
     ("inverse-forgotten-in-p", messages.INFORMATION_FOR_COVARIANCE, "return p", "return total"),
     (
         "noise-not-inverted",
-        "The covariance of the noise multiplies; a noisy measurement must tell less: its inverse belongs there.",
+        "The covariance of the noise multiplies; a noisy measurement must tell less: its inverse "
+        "belongs there.",
         "np.linalg.solve(D_n, H)",
         "D_n @ H",
     ),
     (
         "prior-inverted",
-        "W is an information already and is not inverted again; where nothing is known it has no inverse.",
+        "W is an information already and is not inverted again; where nothing is known it has no "
+        "inverse.",
         "total = W",
         "total = np.linalg.pinv(W)",
     ),
@@ -331,6 +395,7 @@ WRONG_INFORMATION = edits(
         "through-the-inverse",
         "The inverse of W is taken; where nothing is known before there is none.",
         "p = np.linalg.inv(total)",
-        "Psi = np.linalg.pinv(W); p = Psi - gain(Psi @ transpose(H), H @ Psi @ transpose(H) + D_n) @ H @ Psi",
+        "Psi = np.linalg.pinv(W); p = Psi - gain(Psi @ transpose(H), H @ Psi @ transpose(H) + "
+        "D_n) @ H @ Psi",
     ),
 )

@@ -1,7 +1,9 @@
-"""Questions of set g: the extended Kalman filter from its Jacobians, and whether it is right about its own errors.
+"""Questions of set g: the extended Kalman filter from its Jacobians, and whether it is right about
+its own errors.
 
-Answers are functions of arrays: vectors (..., n), matrices (..., r, c), trajectories first.  They are called with the hidden
-functions of hidden.py.  The keys are in keys.py, the known mistakes in mistakes.py.
+Answers are functions of arrays: vectors (..., n), matrices (..., r, c), trajectories first.  They
+are called with the hidden functions of hidden.py.  The keys are in keys.py, the known mistakes in
+mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,8 +16,24 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import at_step
-from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, changing, curved, hidden_law, root
-from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
+from kfcourse.exercises.g_extended.hidden import (
+    RUNS,
+    STEPS,
+    cases,
+    changing,
+    curved,
+    hidden_law,
+    root,
+)
+from kfcourse.exercises.g_extended.keys import (
+    bounds,
+    consistency,
+    correct,
+    information,
+    jacobian,
+    predict,
+    run_filter,
+)
 from kfcourse.exercises.g_extended.mistakes import (
     WRONG_BOUNDS,
     WRONG_CORRECTIONS,
@@ -34,7 +52,10 @@ from kfcourse.laws import apply
 def jacobian_arguments(exercise: Exercise) -> list[tuple]:
     """Hidden functions of three components, and of as many as the variant has."""
     rng = exercise.rng("g1")
-    return [(curved(rng, n, n, 1.0)[0], rng.normal(size=(RUNS, n)), step) for n, step in ((3, 0.02), (exercise.model.n, 0.05))]
+    return [
+        (curved(rng, n, n, 1.0)[0], rng.normal(size=(RUNS, n)), step)
+        for n, step in ((3, 0.02), (exercise.model.n, 0.05))
+    ]
 
 
 # -- g2: bounds
@@ -54,7 +75,10 @@ def bounds_arguments(exercise: Exercise) -> list[tuple]:
 
 def prediction_arguments(exercise: Exercise) -> list[tuple]:
     """Estimates, covariances and the functions of the object."""
-    return [(*hidden_law(rng, n), one.f, one.Phi, one.g, one.D_xi) for one, rng, n, _ in cases(exercise, "g3")]
+    return [
+        (*hidden_law(rng, n), one.f, one.Phi, one.g, one.D_xi)
+        for one, rng, n, _ in cases(exercise, "g3")
+    ]
 
 
 # -- g4: the correction
@@ -73,7 +97,8 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def run_arguments(exercise: Exercise) -> list[tuple]:
-    """Measurements of hidden trajectories, the prior and all functions; of the step too where the variant's depend on it."""
+    """Measurements of hidden trajectories, the prior and all functions; of the step too where the
+    variant's depend on it."""
     found = []
     for one, rng, n, p in cases(exercise, "g5"):
         one = changing(one) if exercise.model.timed else one
@@ -97,7 +122,10 @@ def normalised_arguments(exercise: Exercise) -> list[tuple]:
     for one, rng, n, p in cases(exercise, "g6"):
         shape = (STEPS, RUNS)
         z, lam = rng.normal(size=(2, *shape, n))
-        p_, Psi = (np.array([[covariance(rng, n, scale) for _ in range(RUNS)] for _ in range(STEPS)]) for scale in (0.2, 0.5))
+        p_, Psi = (
+            np.array([[covariance(rng, n, scale) for _ in range(RUNS)] for _ in range(STEPS)])
+            for scale in (0.2, 0.5)
+        )
         x, y = z + 0.4 * rng.normal(size=z.shape), one.S(lam) + rng.normal(size=(*shape, p))
         found.append((x, z, p_, y, lam, Psi, one.S, one.H, one.D_n))
     return found
@@ -107,7 +135,8 @@ def normalised_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def information_arguments(exercise: Exercise) -> list[tuple]:
-    """Information matrices, the first of them zero, and a meter with more components than the state."""
+    """Information matrices, the first of them zero, and a meter with more components than the
+    state."""
     found = []
     for place, (n, p) in enumerate(((3, 4), (exercise.model.n, exercise.model.n + 1))):
         rng = exercise.rng(f"g7-{place}")
@@ -131,7 +160,8 @@ QUESTIONS = (
         WRONG_JACOBIANS,
         tolerance=1e-8,
         advice=(
-            "Try it on a linear function, whose derivative you know, and on a quadratic one: for both, "
+            "Try it on a linear function, whose derivative you know, and on a quadratic one: for "
+            "both, "
             "central differences are exact."
         ),
         axes=("trajectory",),
@@ -145,7 +175,8 @@ QUESTIONS = (
         WRONG_BOUNDS,
         ("low", "high"),
         advice=(
-            "What is the law of the sum? Then of the mean? For many runs the bounds must close in on the degrees of freedom."
+            "What is the law of the sum? Then of the mean? For many runs the bounds must close in "
+            "on the degrees of freedom."
         ),
     ),
     Question(
@@ -156,7 +187,8 @@ QUESTIONS = (
         prediction_arguments,
         WRONG_PREDICTIONS,
         ("lam", "Psi"),
-        advice="Say of each function at which point it is taken, and check with a linear model and no noise.",
+        advice="Say of each function at which point it is taken, and check with a linear model "
+        "and no noise.",
         axes=("trajectory",),
     ),
     Question(
@@ -168,7 +200,8 @@ QUESTIONS = (
         WRONG_CORRECTIONS,
         TWO,
         advice=(
-            "Try two cases: y equal to what was expected, and a meter that tells nothing. Then look at "
+            "Try two cases: y equal to what was expected, and a meter that tells nothing. Then "
+            "look at "
             "where S and where H belongs."
         ),
         axes=("trajectory",),
@@ -181,7 +214,8 @@ QUESTIONS = (
         run_arguments,
         WRONG_RUNS,
         ("z", "p", "lam", "Psi"),
-        advice="Follow the first two steps by hand: which law is compared with y_0, and which with y_1?",
+        advice="Follow the first two steps by hand: which law is compared with y_0, and which "
+        "with y_1?",
         axes=(
             "step",
             "trajectory",
@@ -196,7 +230,8 @@ QUESTIONS = (
         WRONG_NORMALISED,
         ("NEES", "NIS"),
         advice=(
-            "For each of the two: which error, and the covariance of that very error? For a right filter the means are n and p."
+            "For each of the two: which error, and the covariance of that very error? For a right "
+            "filter the means are n and p."
         ),
         axes=("step",),
     ),
@@ -208,7 +243,8 @@ QUESTIONS = (
         information_arguments,
         WRONG_INFORMATION,
         ("p", "K"),
-        advice="Compare with the gain form for one component by hand: which inverses are there, and of what?",
+        advice="Compare with the gain form for one component by hand: which inverses are there, "
+        "and of what?",
         axes=("trajectory",),
     ),
 )

@@ -1,4 +1,5 @@
-"""Keys of set h: white noise on a computer, the Riccati equation and its steady state, a step of the filter."""
+"""Keys of set h: white noise on a computer, the Riccati equation and its steady state, a step of
+the filter."""
 
 from __future__ import annotations
 
@@ -14,7 +15,9 @@ def noise_variances(S_xi: float, N: float, T: float) -> tuple[float, float]:
     return S_xi / (2 * T), N / (2 * T)
 
 
-def simulate_step(x: Array, xi: Array, n: Array, T: float, f: Map, g: Map, S: Map, S_xi: float, N: float) -> tuple[Array, Array]:
+def simulate_step(
+    x: Array, xi: Array, n: Array, T: float, f: Map, g: Map, S: Map, S_xi: float, N: float
+) -> tuple[Array, Array]:
     """x after Euler's step, and the measurement averaged over it."""
     shaken = np.sqrt(S_xi * T / 2) * xi
     noise = np.sqrt(N / (2 * T)) * n
@@ -40,7 +43,17 @@ def steady_state(a: float, s: float, h: float, S_xi: float, N: float) -> tuple[f
 
 
 def filter_step(
-    z: Array, D: Array, y: Array, T: float, f: Map, f_x: Map, g: Map, S: Map, S_x: Map, S_xi: float, N: float
+    z: Array,
+    D: Array,
+    y: Array,
+    T: float,
+    f: Map,
+    f_x: Map,
+    g: Map,
+    S: Map,
+    S_x: Map,
+    S_xi: float,
+    N: float,
 ) -> tuple[Array, Array]:
     """z and D after Euler's step of the filter's equations."""
     K = D * S_x(z) * 2 / N

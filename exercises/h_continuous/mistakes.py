@@ -33,11 +33,22 @@ WRONG_VARIANCES = edits(
         BOTH,
         "S_xi * T / 2, N * T / 2",
     ),
-    ("step-forgotten", "The step is missing: that is an intensity, with other units.", BOTH, "S_xi / 2, N / 2"),
-    ("deviation", messages.DEVIATION_FOR_VARIANCE, BOTH, "np.sqrt(S_xi / (2 * T)), np.sqrt(N / (2 * T))"),
+    (
+        "step-forgotten",
+        "The step is missing: that is an intensity, with other units.",
+        BOTH,
+        "S_xi / 2, N / 2",
+    ),
+    (
+        "deviation",
+        messages.DEVIATION_FOR_VARIANCE,
+        BOTH,
+        "np.sqrt(S_xi / (2 * T)), np.sqrt(N / (2 * T))",
+    ),
     (
         "step-squared",
-        "Divided by the step once too often: the variance of an integral over a step is proportional to the step.",
+        "Divided by the step once too often: the variance of an integral over a step is "
+        "proportional to the step.",
         BOTH,
         "S_xi / (2 * T**2), N / (2 * T**2)",
     ),
@@ -47,7 +58,8 @@ WRONG_SIMULATIONS = edits(
     simulate_step,
     (
         "noise-times-step",
-        "The noise grows with the step like the drift; over a step its variance does, its size with the root of it.",
+        "The noise grows with the step like the drift; over a step its variance does, its size "
+        "with the root of it.",
         "np.sqrt(S_xi * T / 2)",
         "T * np.sqrt(S_xi / 2)",
         "np.sqrt(N / (2 * T))",
@@ -82,7 +94,8 @@ WRONG_SIMULATIONS = edits(
     ),
     (
         "factor-at-end",
-        "The factor of the noise is taken at the end of the step; in Ito's sense it does not know this step's noise yet.",
+        "The factor of the noise is taken at the end of the step; in Ito's sense it does not know "
+        "this step's noise yet.",
         "+ g(x) * shaken",
         "+ g(x + T * f(x) + g(x) * shaken) * shaken",
     ),
@@ -100,24 +113,34 @@ WRONG_RATES = edits(
     riccati,
     (
         "one-side-only",
-        "Both factors of M[e e^T] change with the drift; a term is missing, and the result is not symmetric.",
+        "Both factors of M[e e^T] change with the drift; a term is missing, and the result is not "
+        "symmetric.",
         " + D @ A.T",
         "",
     ),
     ("transposed", "The matrix of the drift is transposed.", "A @ D + D @ A.T", "A.T @ D + D @ A"),
     (
         "discrete",
-        "That is the term of a discrete filter; in continuous time the covariance has a rate, and A enters it once.",
+        "That is the term of a discrete filter; in continuous time the covariance has a rate, and "
+        "A enters it once.",
         "A @ D + D @ A.T",
         "A @ D @ A.T",
     ),
     ("process-one-sided", messages.PROCESS_ONE_SIDED, "G.T / 2", "G.T"),
     ("meter-one-sided", messages.METER_ONE_SIDED, "N / 2", "N"),
-    ("densities-for-intensities", messages.DENSITIES_FOR_INTENSITIES, "G.T / 2", "G.T", "N / 2", "N"),
+    (
+        "densities-for-intensities",
+        messages.DENSITIES_FOR_INTENSITIES,
+        "G.T / 2",
+        "G.T",
+        "N / 2",
+        "N",
+    ),
     ("riccati-sign", messages.RICCATI_SIGN, "- learnt", "+ learnt"),
     (
         "noise-not-inverted",
-        "The density of the meter's noise multiplies; the noisier the meter, the less is learnt: its inverse belongs there.",
+        "The density of the meter's noise multiplies; the noisier the meter, the less is learnt: "
+        "its inverse belongs there.",
         "np.linalg.solve(N / 2, H @ D)",
         "(N / 2) @ H @ D",
     ),
@@ -137,7 +160,12 @@ WRONG_STEADY = edits(
         "2 * D * h",
         "D * h",
     ),
-    ("drift-sign", "The sign of the drift: this process decays by itself.", "    q, c", "    a = -a; q, c"),
+    (
+        "drift-sign",
+        "The sign of the drift: this process decays by itself.",
+        "    q, c",
+        "    a = -a; q, c",
+    ),
     (
         "one-side-only",
         "The drift enters the equation of the variance on both sides; one of them is missing.",
@@ -166,19 +194,22 @@ WRONG_STEPS = edits(
     ("innovation-sign", messages.INNOVATION_SIGN, "y - S(z)", "S(z) - y"),
     (
         "expected-by-slope",
-        "The estimate is multiplied by the slope; what is expected of y is the signal itself at the estimate.",
+        "The estimate is multiplied by the slope; what is expected of y is the signal itself at "
+        "the estimate.",
         "y - S(z)",
         "y - S_x(z) * z",
     ),
     (
         "one-side-only",
-        "The slope of the drift acts on both factors of the variance; one of the two equal terms is missing.",
+        "The slope of the drift acts on both factors of the variance; one of the two equal terms "
+        "is missing.",
         "2 * f_x",
         "f_x",
     ),
     (
         "z-first",
-        "The rate of the variance is taken at the new estimate; both rates belong to the beginning of the step.",
+        "The rate of the variance is taken at the new estimate; both rates belong to the "
+        "beginning of the step.",
         "    D_next",
         "    learnt = D**2 * S_x(z_next) ** 2 * 2 / N\n    D_next",
         "f_x(z) * D + g(z)",
@@ -193,11 +224,17 @@ WRONG_DERIVATIVES = edits(
     derivatives,
     (
         "curvature-dropped",
-        "The second derivative of the signal is missing: the usual filter drops that part, here it is asked for.",
+        "The second derivative of the signal is missing: the usual filter drops that part, here "
+        "it is asked for.",
         SECOND,
         "-k * S1**2",
     ),
-    ("curvature-sign", "The sign of the part with the second derivative of the signal.", ", k * S2", ", -k * S2"),
+    (
+        "curvature-sign",
+        "The sign of the part with the second derivative of the signal.",
+        ", k * S2",
+        ", -k * S2",
+    ),
     (
         "slope-dropped",
         "The innovation depends on x as well: differentiate the product.",
@@ -206,7 +243,8 @@ WRONG_DERIVATIVES = edits(
     ),
     (
         "slope-sign",
-        "The sign of the part without noise: at the top of the likelihood the second derivative is negative.",
+        "The sign of the part without noise: at the top of the likelihood the second derivative "
+        "is negative.",
         "- k * S1**2",
         "+ k * S1**2",
     ),
@@ -218,10 +256,21 @@ WRONG_DERIVATIVES = edits(
     ),
     (
         "half-forgotten",
-        "In the logarithm of the likelihood half of the signal is subtracted from y; the derivative has the whole then.",
+        "In the logarithm of the likelihood half of the signal is subtracted from y; the "
+        "derivative has the whole then.",
         f"{FIRST}, {SECOND}",
         "k * S1 * (y - 2 * S), k * S2 * (y - 2 * S) - 2 * k * S1**2",
     ),
-    ("signal-for-derivative", messages.SIGNAL_FOR_DERIVATIVE, "S.diff(x), S.diff(x, 2)", "S, S.diff(x)"),
-    ("gain-without-slope", "The slope of the signal is missing: the chain rule.", f"{FIRST}, {SECOND}", "k * (y - S), -k * S1"),
+    (
+        "signal-for-derivative",
+        messages.SIGNAL_FOR_DERIVATIVE,
+        "S.diff(x), S.diff(x, 2)",
+        "S, S.diff(x)",
+    ),
+    (
+        "gain-without-slope",
+        "The slope of the signal is missing: the chain rule.",
+        f"{FIRST}, {SECOND}",
+        "k * (y - S), -k * S1",
+    ),
 )

@@ -1,7 +1,8 @@
-"""Questions of set h: the filter in continuous time, for white noises of given one-sided spectral densities.
+"""Questions of set h: the filter in continuous time, for white noises of given one-sided spectral
+densities.
 
-Answers are functions of numbers, of arrays (one number for each run, or matrices), and in the last question of formulas.
-The keys are in keys.py, the known mistakes in mistakes.py.
+Answers are functions of numbers, of arrays (one number for each run, or matrices), and in the last
+question of formulas. The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,7 +15,14 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.h_continuous.keys import derivatives, filter_step, noise_variances, riccati, simulate_step, steady_state
+from kfcourse.exercises.h_continuous.keys import (
+    derivatives,
+    filter_step,
+    noise_variances,
+    riccati,
+    simulate_step,
+    steady_state,
+)
 from kfcourse.exercises.h_continuous.mistakes import (
     WRONG_DERIVATIVES,
     WRONG_RATES,
@@ -27,8 +35,16 @@ from kfcourse.exercises.shared import Map, covariance
 
 RUNS = 6
 
-# dx/dt = -a x + s xi, y = h x + n or h sin(x) + n; densities S_xi, N; d is the variance of x(0): from, to.
-NUMBERS = {"a": (0.4, 0.9), "s": (0.6, 1.1), "h": (0.7, 1.3), "S_xi": (1.5, 2.5), "N": (0.15, 0.4), "d": (0.8, 1.5)}
+# dx/dt = -a x + s xi, y = h x + n or h sin(x) + n; densities S_xi, N; d is the variance of x(0):
+# from, to.
+NUMBERS = {
+    "a": (0.4, 0.9),
+    "s": (0.6, 1.1),
+    "h": (0.7, 1.3),
+    "S_xi": (1.5, 2.5),
+    "N": (0.15, 0.4),
+    "d": (0.8, 1.5),
+}
 
 
 def continuous_numbers(exercise: Exercise) -> dict[str, float]:
@@ -43,7 +59,10 @@ def continuous_numbers(exercise: Exercise) -> dict[str, float]:
 def variances_arguments(exercise: Exercise) -> list[tuple]:
     """Densities of both noises and a step, three times."""
     rng = exercise.rng("h1")
-    return [tuple(round(float(v), 3) for v in rng.uniform([1.2, 0.2, 0.01], [4, 0.9, 0.3])) for _ in range(3)]
+    return [
+        tuple(round(float(v), 3) for v in rng.uniform([1.2, 0.2, 0.01], [4, 0.9, 0.3]))
+        for _ in range(3)
+    ]
 
 
 # -- h2: a step of a simulation
@@ -52,7 +71,10 @@ def variances_arguments(exercise: Exercise) -> list[tuple]:
 def curve(rng: np.random.Generator, slope: float) -> tuple[Map, Map]:
     """A hidden smooth function of a number, and its derivative."""
     a, b, c, d = rng.uniform([0.8, 0.3, 0.4, 0.2], [1.2, 0.5, 0.8, 0.6])
-    return lambda x: slope * (a * x + b * np.sin(x + c) + d), lambda x: slope * (a + b * np.cos(x + c))
+    return (
+        lambda x: slope * (a * x + b * np.sin(x + c) + d),
+        lambda x: slope * (a + b * np.cos(x + c)),
+    )
 
 
 def positive(rng: np.random.Generator) -> Map:
@@ -107,7 +129,18 @@ def step_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("h5")
     z, y = rng.normal(size=(2, RUNS))
     D, T = rng.uniform(0.4, 1.2, RUNS), rng.uniform(0.01, 0.03)
-    return [(z, D, y, T, *curve(rng, -0.7), positive(rng), *curve(rng, 1.3), *rng.uniform([1.4, 0.2], [2.6, 0.5]))]
+    return [
+        (
+            z,
+            D,
+            y,
+            T,
+            *curve(rng, -0.7),
+            positive(rng),
+            *curve(rng, 1.3),
+            *rng.uniform([1.4, 0.2], [2.6, 0.5]),
+        )
+    ]
 
 
 # -- h6: derivatives of the log-likelihood
@@ -117,7 +150,10 @@ def derivatives_arguments(exercise: Exercise) -> list[tuple]:
     """Three signals of x."""
     x, y, N = sp.symbols("x y N_n", real=True)
     a, b, c = (sp.Rational(int(k), 10) for k in exercise.rng("h6").integers(3, 10, 3))
-    return [(signal, x, y, N) for signal in (sp.sin(x + a) + b * x, sp.exp(c * x) + b * x**2, x + a * x**3)]
+    return [
+        (signal, x, y, N)
+        for signal in (sp.sin(x + a) + b * x, sp.exp(c * x) + b * x**2, x + a * x**3)
+    ]
 
 
 QUESTIONS = (
@@ -140,7 +176,8 @@ QUESTIONS = (
         WRONG_SIMULATIONS,
         ("x_next", "y"),
         advice=(
-            "Check the variances: after a step without drift that of the state grows in proportion to T, that of y falls with T."
+            "Check the variances: after a step without drift that of the state grows in "
+            "proportion to T, that of y falls with T."
         ),
         axes=("trajectory",),
     ),
@@ -152,7 +189,8 @@ QUESTIONS = (
         rate_arguments,
         WRONG_RATES,
         advice=(
-            "Try one component: the equation of the chapter has three terms. Then ask for each product of "
+            "Try one component: the equation of the chapter has three terms. Then ask for each "
+            "product of "
             "matrices whether it is symmetric."
         ),
     ),
@@ -165,7 +203,8 @@ QUESTIONS = (
         WRONG_STEADY,
         ("D", "K"),
         advice=(
-            "Put your D into the Riccati equation: is the derivative zero? Then let the meter become "
+            "Put your D into the Riccati equation: is the derivative zero? Then let the meter "
+            "become "
             "useless: which D must come out?"
         ),
     ),
@@ -177,7 +216,10 @@ QUESTIONS = (
         step_arguments,
         WRONG_STEPS,
         ("z", "D"),
-        advice=("Leave out the noises, then the meter: what remains must be the plain equation x' = f(x) and its variance."),
+        advice=(
+            "Leave out the noises, then the meter: what remains must be the plain equation x' = "
+            "f(x) and its variance."
+        ),
         axes=("trajectory",),
     ),
     Question(

@@ -1,4 +1,5 @@
-"""Keys of set i: matrices and noise of the motion, start-up, a step with a known input, a square root."""
+"""Keys of set i: matrices and noise of the motion, start-up, a step with a known input, a square
+root."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ def start_up(y0: sp.Expr, y1: sp.Expr, y2: sp.Expr, dt: sp.Expr) -> tuple[sp.Exp
     return r, v, a
 
 
-def step(z: Array, p: Array, u: Array, y: Array, A: Array, B: Array, H: Array, Q: Array, R: Array) -> tuple[Array, ...]:
+def step(
+    z: Array, p: Array, u: Array, y: Array, A: Array, B: Array, H: Array, Q: Array, R: Array
+) -> tuple[Array, ...]:
     """lam, Psi, z, p of a step with the known input u."""
     lam, Psi = A @ z + B @ u, A @ p @ A.T + Q
     F = H @ Psi @ H.T + R
@@ -36,7 +39,8 @@ def step(z: Array, p: Array, u: Array, y: Array, A: Array, B: Array, H: Array, Q
 
 
 def correct_root(lam: Array, S: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
-    """z and the lower triangular root of its covariance, diagonal positive: a QR decomposition of the pre-array."""
+    """z and the lower triangular root of its covariance, diagonal positive: a QR decomposition of
+    the pre-array."""
     p = len(y)
     array = np.block([[np.linalg.cholesky(R), H @ S], [np.zeros((len(S), p)), S]])
     lower = np.asarray(np.linalg.qr(array.T, mode="r")).T

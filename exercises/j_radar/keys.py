@@ -1,4 +1,5 @@
-"""Keys of set j: coordinates of a radar, the constant gain, the alpha-beta filter, its lag and the noise that it leaves."""
+"""Keys of set j: coordinates of a radar, the constant gain, the alpha-beta filter, its lag and the
+noise that it leaves."""
 
 from __future__ import annotations
 
@@ -30,7 +31,9 @@ def steady_gain(alpha: float) -> tuple[float, float]:
     return beta, beta / np.sqrt(1 - alpha)
 
 
-def alpha_beta(y: Array, T: float, alpha: float, beta: float, r: Array, v: Array) -> tuple[Array, Array]:
+def alpha_beta(
+    y: Array, T: float, alpha: float, beta: float, r: Array, v: Array
+) -> tuple[Array, Array]:
     """Estimates of position and velocity, (steps, N, axes) each."""
     r, v = np.broadcast_to(r, y.shape[1:]), np.broadcast_to(v, y.shape[1:])
     positions, velocities = [], []
@@ -46,7 +49,8 @@ def alpha_beta(y: Array, T: float, alpha: float, beta: float, r: Array, v: Array
 def lag(a: sp.Expr, T: sp.Expr, alpha: sp.Expr, beta: sp.Expr) -> tuple[sp.Expr, ...]:
     """How far position and velocity stay behind at a constant acceleration a.
 
-    The fixed point of the error without noise, e <- (I - K H)(A e + (T^2/2, T) a), e the truth less the estimate.
+    The fixed point of the error without noise, e <- (I - K H)(A e + (T^2/2, T) a), e the truth less
+    the estimate.
     """
     rest = sp.eye(2) - sp.Matrix([alpha, beta / T]) * sp.Matrix([[1, 0]])
     A, push = sp.Matrix([[1, T], [0, 1]]), a * sp.Matrix([T**2 / 2, T])

@@ -1,7 +1,7 @@
 """Questions of set j: an alpha-beta filter on a radar track.
 
-What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
-`radar_numbers`; hidden arguments are others, so an answer holds for any.
+What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.
+Personal numbers are in `radar_numbers`; hidden arguments are others, so an answer holds for any.
 
 The keys are in keys.py, the known mistakes in mistakes.py.
 """
@@ -17,7 +17,14 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.j_radar.keys import alpha_beta, cartesian, lag, meter_jacobian, noise_left, steady_gain
+from kfcourse.exercises.j_radar.keys import (
+    alpha_beta,
+    cartesian,
+    lag,
+    meter_jacobian,
+    noise_left,
+    steady_gain,
+)
 from kfcourse.exercises.j_radar.mistakes import (
     WRONG_CARTESIANS,
     WRONG_FILTERS,
@@ -33,7 +40,12 @@ from kfcourse.filters.alphabeta import steady_beta
 def radar_numbers(exercise: Exercise) -> dict[str, float]:
     """T (s), sigma (m), alpha, and the radius of the first circle (m)."""
     return personal(
-        exercise, "j", T=(0.8, 0.5, 1.5), sigma=(100.0, 50, 150), alpha=(0.095, 0.07, 0.25), radius=(6000.0, 4500, 7500)
+        exercise,
+        "j",
+        T=(0.8, 0.5, 1.5),
+        sigma=(100.0, 50, 150),
+        alpha=(0.095, 0.07, 0.25),
+        radius=(6000.0, 4500, 7500),
     )
 
 
@@ -53,7 +65,9 @@ def filter_arguments(exercise: Exercise) -> list[tuple]:
 # -- j5, j6: lag and noise
 
 
-def several(name: str, limits: tuple[tuple[float, float], ...]) -> Callable[[Exercise], list[tuple]]:
+def several(
+    name: str, limits: tuple[tuple[float, float], ...]
+) -> Callable[[Exercise], list[tuple]]:
     """Three sets of hidden numbers."""
 
     def arguments(exercise: Exercise) -> list[tuple]:
@@ -88,7 +102,8 @@ QUESTIONS = (
         lambda e: [sp.symbols("x y z", positive=True)],
         WRONG_JACOBIANS,
         advice=(
-            "Differentiate one measurement at a time, by x, y, z in turn; each row has the unit of its measurement over a length."
+            "Differentiate one measurement at a time, by x, y, z in turn; each row has the unit "
+            "of its measurement over a length."
         ),
     ),
     Question(
@@ -99,7 +114,10 @@ QUESTIONS = (
         several("j3", ((0.15, 0.7),)),
         WRONG_GAINS,
         ("beta", "index"),
-        advice=("Put your beta into the three equations of the hint: do they hold? For small alpha, beta is about alpha^2/2."),
+        advice=(
+            "Put your beta into the three equations of the hint: do they hold? For small alpha, "
+            "beta is about alpha^2/2."
+        ),
     ),
     Question(
         "j4",
@@ -109,7 +127,10 @@ QUESTIONS = (
         filter_arguments,
         WRONG_FILTERS,
         ("r", "v"),
-        advice=("Follow the first two steps by hand: what is given is the prediction for the first measurement already."),
+        advice=(
+            "Follow the first two steps by hand: what is given is the prediction for the first "
+            "measurement already."
+        ),
         axes=(
             "step",
             "trajectory",
@@ -133,7 +154,8 @@ QUESTIONS = (
         share_arguments,
         WRONG_SHARES,
         advice=(
-            "Try alpha = 1 with a small beta: the estimate is the measurement itself; and check that the "
+            "Try alpha = 1 with a small beta: the estimate is the measurement itself; and check "
+            "that the "
             "answer is below one for a small alpha."
         ),
     ),

@@ -1,4 +1,5 @@
-"""Keys of set k: the error of a slow sensor as the state, its filter and the steady state of that, gaps and biases.
+"""Keys of set k: the error of a slow sensor as the state, its filter and the steady state of that,
+gaps and biases.
 
 Letters are the book's: Psi and p are the lecture's D with a tilde and D.
 """
@@ -36,7 +37,9 @@ def gained(sigma_xi: sp.Expr, sigma_n: sp.Expr, T: sp.Expr) -> tuple[sp.Expr, ..
     return sigma_n / sp.sqrt(p), -T / sp.log(1 + K)
 
 
-def integrate(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float) -> tuple[Array, Array]:
+def integrate(
+    y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float
+) -> tuple[Array, Array]:
     """Velocities less the estimated error, and its variances p."""
     eps, Psi = np.zeros(y_ins.shape[1:]), p0
     velocities, variances = [], []
@@ -51,7 +54,9 @@ def integrate(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: fl
     return np.array(velocities), np.array(variances)
 
 
-def lost(p: sp.Expr, sigma_xi: sp.Expr, sigma_n: sp.Expr, n: sp.Expr, T: sp.Expr) -> tuple[sp.Expr, ...]:
+def lost(
+    p: sp.Expr, sigma_xi: sp.Expr, sigma_n: sp.Expr, n: sp.Expr, T: sp.Expr
+) -> tuple[sp.Expr, ...]:
     """Standard deviation after n periods without receiver, and when it is that of the receiver."""
     return sp.sqrt(p + n * sigma_xi**2), T * (sigma_n**2 - p) / sigma_xi**2
 

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
-from kfcourse.exercises.k_integration.keys import bias_error, error_meter, gained, integrate, lost, steady_state
+from kfcourse.exercises.k_integration.keys import (
+    bias_error,
+    error_meter,
+    gained,
+    integrate,
+    lost,
+    steady_state,
+)
 
-GAIN_BY_NOISE = "The gain is divided by the receiver's noise alone; the prediction's error belongs to the innovation too."
+GAIN_BY_NOISE = (
+    "The gain is divided by the receiver's noise alone; the prediction's error "
+    "belongs to the innovation too."
+)
 DEVIATIONS = "Standard deviations stand where variances belong: check the units."
 
 # -- k1: the error of the slow sensor as the state
@@ -15,7 +25,8 @@ WRONG_METERS = edits(
     error_meter,
     (
         "error-sign",
-        "The error of the slow sensor is added; it measures too much by it, so the quantity itself is smaller.",
+        "The error of the slow sensor is added; it measures too much by it, so the quantity "
+        "itself is smaller.",
         "y - eps",
         "y + eps",
     ),
@@ -27,7 +38,8 @@ WRONG_METERS = edits(
     ),
     (
         "slope-at-reading",
-        "The derivative is taken at the sensor's reading; the error has to be removed from it first.",
+        "The derivative is taken at the sensor's reading; the error has to be removed from it "
+        "first.",
         "sp.diff(h, eps)",
         "sp.diff(h, eps).subs(eps, 0)",
     ),
@@ -37,8 +49,18 @@ WRONG_METERS = edits(
         "y - eps",
         "eps",
     ),
-    ("reading-minus-signal", "The reading is inside the signal function, not outside.", "signal(y - eps)", "y - signal(eps)"),
-    ("difference-reversed", "The difference is reversed: it is the reading minus its error.", "y - eps", "eps - y"),
+    (
+        "reading-minus-signal",
+        "The reading is inside the signal function, not outside.",
+        "signal(y - eps)",
+        "y - signal(eps)",
+    ),
+    (
+        "difference-reversed",
+        "The difference is reversed: it is the reading minus its error.",
+        "y - eps",
+        "eps - y",
+    ),
     ("second-derivative", "The slope is the first derivative.", "diff(h, eps)", "diff(h, eps, 2)"),
 )
 
@@ -60,20 +82,32 @@ WRONG_STEADY = edits(
         ROOT,
         "sp.sqrt(sigma_xi**4) + 4 * sigma_xi**2 * sigma_n**2",
     ),
-    ("four-forgotten", "A factor is missing under the root: write down the discriminant again.", "+ 4 * ", "+ "),
+    (
+        "four-forgotten",
+        "A factor is missing under the root: write down the discriminant again.",
+        "+ 4 * ",
+        "+ ",
+    ),
     (
         "half-forgotten",
-        "A factor is missing in front: the root of a quadratic equation is divided by twice its first coefficient.",
+        "A factor is missing in front: the root of a quadratic equation is divided by twice its "
+        "first coefficient.",
         ")) / 2",
         "))",
     ),
     (
         "gain-of-estimate",
-        "The gain is made of the variance after the correction; at the measurement the filter is as sure as Psi says.",
+        "The gain is made of the variance after the correction; at the measurement the filter is "
+        "as sure as Psi says.",
         "-Psi / (Psi + sigma_n**2)",
         "-p / (p + sigma_n**2)",
     ),
-    ("gain-by-noise-alone", GAIN_BY_NOISE, "K = -Psi / (Psi + sigma_n**2)", "K = -Psi / sigma_n**2"),
+    (
+        "gain-by-noise-alone",
+        GAIN_BY_NOISE,
+        "K = -Psi / (Psi + sigma_n**2)",
+        "K = -Psi / sigma_n**2",
+    ),
     ("small-drift", messages.SMALL_DRIFT, f"(sigma_xi**2 + {ROOT}) / 2", "sigma_xi * sigma_n"),
     (
         "share-sign",
@@ -95,7 +129,8 @@ WRONG_FILTERS = edits(
     ),
     (
         "gain-sign",
-        "The gain has the wrong sign: the INS reads too much where the receiver's minus its velocity is negative.",
+        "The gain has the wrong sign: the INS reads too much where the receiver's minus its "
+        "velocity is negative.",
         "else -Psi",
         "else Psi",
         "(1 + K)",
@@ -109,25 +144,29 @@ WRONG_FILTERS = edits(
     ),
     (
         "drift-forgotten",
-        "The drift of the INS is not added to the variance: the filter becomes surer and surer and falls asleep.",
+        "The drift of the INS is not added to the variance: the filter becomes surer and surer "
+        "and falls asleep.",
         "p + sigma_xi**2",
         "p",
     ),
     (
         "receiver-for-difference",
-        "The receiver's velocity is compared with the error; compare it with what the INS reads, less its error.",
+        "The receiver's velocity is compared with the error; compare it with what the INS reads, "
+        "less its error.",
         "(sr - (ins - eps))",
         "(sr - eps)",
     ),
     (
         "error-not-removed",
-        "The innovation is made with the raw reading of the INS; its estimated error has to be taken off first.",
+        "The innovation is made with the raw reading of the INS; its estimated error has to be "
+        "taken off first.",
         "(sr - (ins - eps))",
         "(sr - ins)",
     ),
     (
         "noise-as-deviation",
-        "In the gain the receiver's noise is a standard deviation beside a variance: square sigma_n.",
+        "In the gain the receiver's noise is a standard deviation beside a variance: square "
+        "sigma_n.",
         "sigma_n**2",
         "sigma_n",
     ),
@@ -139,7 +178,8 @@ WRONG_FILTERS = edits(
     ),
     (
         "missing-as-zero",
-        "A missing measurement is treated as the number 0; it says nothing, so the error keeps its estimate.",
+        "A missing measurement is treated as the number 0; it says nothing, so the error keeps "
+        "its estimate.",
         "lost = np.isnan(sr).any()",
         "lost, sr = False, np.nan_to_num(sr)",
     ),
@@ -161,21 +201,33 @@ WRONG_IMPROVEMENTS = edits(
         "sigma_n / sp.sqrt(p)",
         "sigma_n**2 / p",
     ),
-    ("variance-for-deviation", "A standard deviation is divided by a variance: check the units.", "sp.sqrt(p)", "p"),
+    (
+        "variance-for-deviation",
+        "A standard deviation is divided by a variance: check the units.",
+        "sp.sqrt(p)",
+        "p",
+    ),
     (
         "prediction",
-        "That compares with the prediction's error; the integrated velocity has that of the estimate.",
+        "That compares with the prediction's error; the integrated velocity has that of the "
+        "estimate.",
         "_, p, K =",
         "p, _, K =",
     ),
     ("gain-sign", messages.LEFT_AFTER_A_STEP, "-T / sp.log(1 + K)", "T / sp.log(1 - K)"),
     (
         "first-order",
-        "That is the leading term for a small gain; take the logarithm of what is left after a step.",
+        "That is the leading term for a small gain; take the logarithm of what is left after a "
+        "step.",
         "sp.log(1 + K)",
         "K",
     ),
-    ("in-steps", "The time constant is in steps; in seconds it is T times longer.", "-T / ", "-1 / "),
+    (
+        "in-steps",
+        "The time constant is in steps; in seconds it is T times longer.",
+        "-T / ",
+        "-1 / ",
+    ),
     (
         "half-life",
         "That is the time after which a half is left; a time constant is that to one e-th.",
@@ -204,7 +256,8 @@ WRONG_GROWTHS = edits(
     ),
     (
         "grows-as-n",
-        "The standard deviation of a Wiener process grows with the root of the time, not with the time.",
+        "The standard deviation of a Wiener process grows with the root of the time, not with the "
+        "time.",
         f"{DEVIATION}, {UNTIL}",
         "sp.sqrt(p) + n * sigma_xi, T * (sigma_n - sp.sqrt(p)) / sigma_xi",
     ),
@@ -216,14 +269,16 @@ WRONG_GROWTHS = edits(
     ),
     (
         "start-forgotten",
-        "The error at the beginning of the gap is forgotten: the filter did not know the INS exactly.",
+        "The error at the beginning of the gap is forgotten: the filter did not know the INS "
+        "exactly.",
         f"{DEVIATION}, {UNTIL}",
         "sp.sqrt(n) * sigma_xi, T * sigma_n**2 / sigma_xi**2",
     ),
     ("in-periods", "That is a number of periods; the time is asked for in seconds.", "T * (", "("),
     (
         "start-added",
-        "The variance at the beginning is added; part of the way is gone already when the gap begins.",
+        "The variance at the beginning is added; part of the way is gone already when the gap "
+        "begins.",
         "sigma_n**2 - p",
         "sigma_n**2 + p",
     ),
@@ -245,7 +300,22 @@ WRONG_BIASES = edits(
         "(-K) * j",
     ),
     ("one-step", "That is what the first biased measurement does.", "(1 - (1 + K) ** j)", "(-K)"),
-    ("one-step-late", "It is one step late: the first biased measurement counts already.", "** j", "** (j - 1)"),
-    ("one-step-early", "It is one step early: after no biased measurement the error is zero.", "** j", "** (j + 1)"),
-    ("power-of-K", "What is left after a step is not K: take what has not passed yet to the power.", "(1 + K) ** j", "K**j"),
+    (
+        "one-step-late",
+        "It is one step late: the first biased measurement counts already.",
+        "** j",
+        "** (j - 1)",
+    ),
+    (
+        "one-step-early",
+        "It is one step early: after no biased measurement the error is zero.",
+        "** j",
+        "** (j + 1)",
+    ),
+    (
+        "power-of-K",
+        "What is left after a step is not K: take what has not passed yet to the power.",
+        "(1 + K) ** j",
+        "K**j",
+    ),
 )

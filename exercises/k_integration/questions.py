@@ -1,7 +1,8 @@
 """Questions of set k: an inertial system integrated with a satellite receiver.
 
-What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
-`integration_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in mistakes.py.
+What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.
+Personal numbers are in `integration_numbers`; hidden arguments are others.  The keys are in
+keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,7 +15,14 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.k_integration.keys import bias_error, error_meter, gained, integrate, lost, steady_state
+from kfcourse.exercises.k_integration.keys import (
+    bias_error,
+    error_meter,
+    gained,
+    integrate,
+    lost,
+    steady_state,
+)
 from kfcourse.exercises.k_integration.mistakes import (
     WRONG_BIASES,
     WRONG_FILTERS,
@@ -30,7 +38,14 @@ S_XI, S_N = sp.symbols("sigma_xi sigma_n", positive=True)
 
 def integration_numbers(exercise: Exercise) -> dict[str, float]:
     """T (s), sigma_n and sigma_xi (m/s), gap: how long the receiver is lost (s)."""
-    return personal(exercise, "k", T=(0.1, 0.05, 0.4), sigma_n=(0.2, 0.1, 0.5), sigma_xi=(0.01, 0.005, 0.025), gap=(60.0, 30, 90))
+    return personal(
+        exercise,
+        "k",
+        T=(0.1, 0.05, 0.4),
+        sigma_n=(0.2, 0.1, 0.5),
+        sigma_xi=(0.01, 0.005, 0.025),
+        gap=(60.0, 30, 90),
+    )
 
 
 # -- k1: the error of the slow sensor as the state
@@ -41,7 +56,10 @@ def signals(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("k1")
     a, b, c = (sp.Rational(int(number), 10) for number in rng.integers(12, 40, 3))
     y, eps = sp.symbols("y eps", real=True)
-    return [(signal, y, eps) for signal in (lambda x: x, lambda x: a * x + sp.sqrt(b + x**2) + sp.sin(c * x))]
+    return [
+        (signal, y, eps)
+        for signal in (lambda x: x, lambda x: a * x + sp.sqrt(b + x**2) + sp.sin(c * x))
+    ]
 
 
 # -- k3: the filter
@@ -52,7 +70,9 @@ def filter_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("k3")
     sigma_xi, sigma_n, p0 = rng.uniform(0.2, 0.5), rng.uniform(0.6, 0.9), rng.uniform(1.5, 3)
     V = 5 * rng.normal(size=(8, 4, 3))
-    eps = np.sqrt(p0) * rng.normal(size=(4, 3)) + np.cumsum(sigma_xi * rng.normal(size=V.shape), axis=0)
+    eps = np.sqrt(p0) * rng.normal(size=(4, 3)) + np.cumsum(
+        sigma_xi * rng.normal(size=V.shape), axis=0
+    )
     y_sr = V + sigma_n * rng.normal(size=V.shape)
     gaps = y_sr.copy()
     gaps[[2, 3, 6]] = np.nan
@@ -89,7 +109,8 @@ QUESTIONS = (
         WRONG_FILTERS,
         ("V", "p"),
         advice=(
-            "Follow one axis for two steps by hand: the prior is for the first measurement; without a "
+            "Follow one axis for two steps by hand: the prior is for the first measurement; "
+            "without a "
             "measurement only the variance changes."
         ),
         axes=("step",),
@@ -102,7 +123,8 @@ QUESTIONS = (
         lambda e: [(S_XI, S_N, sp.Symbol("T", positive=True))],
         WRONG_IMPROVEMENTS,
         ("factor", "time_constant"),
-        advice="Check the units: the first is a pure number, the second a time. Is the first larger than one?",
+        advice="Check the units: the first is a pure number, the second a time. Is the first "
+        "larger than one?",
     ),
     Question(
         "k5",
@@ -113,7 +135,8 @@ QUESTIONS = (
         WRONG_GROWTHS,
         ("deviation", "until"),
         advice=(
-            "Variances grow in proportion to the number of periods; convert to a standard deviation, and "
+            "Variances grow in proportion to the number of periods; convert to a standard "
+            "deviation, and "
             "periods to seconds, last."
         ),
     ),
@@ -124,7 +147,8 @@ QUESTIONS = (
         bias_error,
         lambda e: [(*sp.symbols("beta K", real=True), sp.Symbol("j", integer=True, positive=True))],
         WRONG_BIASES,
-        advice="Try the first and the second biased measurement by hand, then an infinite number of them.",
+        advice="Try the first and the second biased measurement by hand, then an infinite number "
+        "of them.",
     ),
 )
 

@@ -1,4 +1,5 @@
-"""Keys of set l: two rates, two clocks, a correction of varying dimension, late measurements, what ignoring a tag costs."""
+"""Keys of set l: two rates, two clocks, a correction of varying dimension, late measurements, what
+ignoring a tag costs."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ def move(m: Array, P: Array, dt: float, q: float) -> tuple[Array, Array]:
     return A @ m, A @ P @ A.T + Q
 
 
-def fuse(tags: Array, arrivals: Array, values: Array, m: Array, P: Array, q: float, r: float, now: float) -> tuple[Array, Array]:
+def fuse(
+    tags: Array, arrivals: Array, values: Array, m: Array, P: Array, q: float, r: float, now: float
+) -> tuple[Array, Array]:
     """The estimate at `now` from what has arrived, each measurement at its tag."""
     time, moments, used = 0.0, tags, arrivals <= now
     for i in np.argsort(tags):
@@ -52,6 +55,7 @@ def cost(V: sp.Expr, a: sp.Expr, tau: sp.Expr) -> tuple[sp.Expr, ...]:
 
 
 def fit_clock(edges: Array, stamps: Array) -> tuple[float, float]:
-    """Rate and shift of the clock from pairs of edges and stamps: the edges fitted on the stamps."""
+    """Rate and shift of the clock from pairs of edges and stamps: the edges fitted on the
+    stamps."""
     slope, level = np.polyfit(stamps, edges, 1)
     return 1 / slope, -level / slope

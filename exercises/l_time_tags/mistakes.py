@@ -4,16 +4,36 @@ from __future__ import annotations
 
 from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
-from kfcourse.exercises.l_time_tags.keys import correct, cost, dimension, fit_clock, fuse, move, own_time
+from kfcourse.exercises.l_time_tags.keys import (
+    correct,
+    cost,
+    dimension,
+    fit_clock,
+    fuse,
+    move,
+    own_time,
+)
 
 # -- l1: two rates in one vector; l2: two time scales
 
 THERE = "(k >= first) & ((k - first) % ratio == 0)"
-SUM_FOR_DIFFERENCE = "first is added to the step: how many steps have passed since the first measurement?"
+SUM_FOR_DIFFERENCE = (
+    "first is added to the step: how many steps have passed since the first measurement?"
+)
 WRONG_DIMENSIONS = edits(
     dimension,
-    ("from-the-first-step", "The receiver's first measurement is not at step 0.", THERE, "k % ratio == 0"),
-    ("before-the-first", "Before its first measurement the receiver gives nothing.", "(k >= first) & ", ""),
+    (
+        "from-the-first-step",
+        "The receiver's first measurement is not at step 0.",
+        THERE,
+        "k % ratio == 0",
+    ),
+    (
+        "before-the-first",
+        "Before its first measurement the receiver gives nothing.",
+        "(k >= first) & ",
+        "",
+    ),
     (
         "one-step-off",
         "It is one step off: steps are counted from 0.",
@@ -28,29 +48,52 @@ WRONG_DIMENSIONS = edits(
     ),
     (
         "held",
-        "Once the receiver has measured, its value is counted at every step: one measurement taken for many.",
+        "Once the receiver has measured, its value is counted at every step: one measurement "
+        "taken for many.",
         THERE,
         "k >= first",
     ),
     (
         "only-between",
-        "ratio is the number of steps from one measurement to the next, not the number of steps between them.",
+        "ratio is the number of steps from one measurement to the next, not the number of steps "
+        "between them.",
         "% ratio",
         "% (ratio + 1)",
     ),
-    ("receiver-only", "Only the receiver's components are counted; the INS measures at every step.", "2.0, 1.0", "1.0, 0.0"),
+    (
+        "receiver-only",
+        "Only the receiver's components are counted; the INS measures at every step.",
+        "2.0, 1.0",
+        "1.0, 0.0",
+    ),
     ("first-left-out", "The receiver's first measurement counts too.", "k >= first", "k > first"),
     ("sum-for-difference", SUM_FOR_DIFFERENCE, "k - first", "k + first"),
-    ("counted-from-zero", "The period is counted from step 0; it begins with the first measurement.", "(k - first) %", "k %"),
+    (
+        "counted-from-zero",
+        "The period is counted from step 0; it begins with the first measurement.",
+        "(k - first) %",
+        "k %",
+    ),
 )
 
 WRONG_TIMES = edits(
     own_time,
-    ("shift-sign", "The shift has the wrong sign: a clock that is ahead shows too much.", "- shift", "+ shift"),
-    ("rate-multiplied", "The rate stands on the wrong side: a clock that is fast shows too much.", "/ rate", "* rate"),
+    (
+        "shift-sign",
+        "The shift has the wrong sign: a clock that is ahead shows too much.",
+        "- shift",
+        "+ shift",
+    ),
+    (
+        "rate-multiplied",
+        "The rate stands on the wrong side: a clock that is fast shows too much.",
+        "/ rate",
+        "* rate",
+    ),
     (
         "shift-not-divided",
-        "The order is wrong: first the shift is taken off, then the rate; undo last what was done last.",
+        "The order is wrong: first the shift is taken off, then the rate; undo last what was done "
+        "last.",
         "(reading - shift) / rate",
         "reading / rate - shift",
     ),
@@ -76,7 +119,8 @@ WRONG_CORRECTIONS = edits(
     ),
     (
         "missing-as-expected",
-        "In place of what is missing stands what was expected: the covariance then shrinks as if it had been measured.",
+        "In place of what is missing stands what was expected: the covariance then shrinks as if "
+        "it had been measured.",
         "y, H, R = y[there], H[there], R[np.ix_(there, there)]",
         "y = np.where(there, y, H @ m)",
     ),
@@ -90,11 +134,13 @@ WRONG_CORRECTIONS = edits(
         "wrong-rows-of-H",
         "H has as many rows as there are components, but not those that belong to them.",
         "y[there], H[there], R[np.ix_(there, there)]\n    F",
-        "(y - H @ m)[there] + H[: there.sum()] @ m, H[: there.sum()], R[np.ix_(there, there)]\n    F",
+        "(y - H @ m)[there] + H[: there.sum()] @ m, H[: there.sum()], R[np.ix_(there, there)]\n   "
+        " F",
     ),
     (
         "wrong-part-of-R",
-        "R has the right size, but its rows and columns are not those of the components that are there.",
+        "R has the right size, but its rows and columns are not those of the components that are "
+        "there.",
         "R[np.ix_(there, there)]",
         "R[: there.sum(), : there.sum()]",
     ),
@@ -118,7 +164,8 @@ WRONG_MOVES = edits(
     move,
     (
         "constant-in-interval",
-        "That is for an acceleration that is constant over the interval. With intervals of any length it does not fit: two short "
+        "That is for an acceleration that is constant over the interval. With intervals of any "
+        "length it does not fit: two short "
         "ones must give the same as the long one.",
         Q,
         "[[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]]",
@@ -132,7 +179,8 @@ WRONG_MOVES = edits(
     ("velocity-only", "The noise reaches the position too.", Q, "[[0, 0], [0, dt]]"),
     (
         "diagonal",
-        "The noise of position and that of velocity are correlated: they come from one acceleration.",
+        "The noise of position and that of velocity are correlated: they come from one "
+        "acceleration.",
         Q,
         "[[dt**3 / 3, 0], [0, dt]]",
     ),
@@ -142,9 +190,24 @@ WRONG_MOVES = edits(
         "A @ P @ A.T",
         "P",
     ),
-    ("intensity-power", "The intensity of the noise enters with another power.", "q * np", "q**2 * np"),
-    ("factors-forgotten", "The factors from the integration are missing in the noise.", Q, "[[dt**3, dt**2], [dt**2, dt]]"),
-    ("correlation-sign", messages.CORRELATION_SIGN, Q, "[[dt**3 / 3, -(dt**2) / 2], [-(dt**2) / 2, dt]]"),
+    (
+        "intensity-power",
+        "The intensity of the noise enters with another power.",
+        "q * np",
+        "q**2 * np",
+    ),
+    (
+        "factors-forgotten",
+        "The factors from the integration are missing in the noise.",
+        Q,
+        "[[dt**3, dt**2], [dt**2, dt]]",
+    ),
+    (
+        "correlation-sign",
+        messages.CORRELATION_SIGN,
+        Q,
+        "[[dt**3 / 3, -(dt**2) / 2], [-(dt**2) / 2, dt]]",
+    ),
     (
         "transition-transposed",
         "A is transposed: in A P A^T the transposed one stands on the right.",
@@ -165,13 +228,15 @@ WRONG_FUSIONS = edits(
     ),
     (
         "mean-delay",
-        "The mean delay is subtracted from the arrival; the tag says the moment of each measurement by itself.",
+        "The mean delay is subtracted from the arrival; the tag says the moment of each "
+        "measurement by itself.",
         "moments, used = 0.0, tags",
         "moments, used = 0.0, arrivals - (arrivals - tags).mean()",
     ),
     (
         "late-dropped",
-        "A measurement that arrives out of order is dropped; it still tells something of the past, and so of the present.",
+        "A measurement that arrives out of order is dropped; it still tells something of the "
+        "past, and so of the present.",
         "argsort(tags)",
         "argsort(arrivals)",
         "if used[i]",
@@ -187,14 +252,21 @@ WRONG_FUSIONS = edits(
     ),
     (
         "time-runs-backwards",
-        "For a measurement that arrives out of order the filter predicts over a negative interval: noise would become negative.",
+        "For a measurement that arrives out of order the filter predicts over a negative "
+        "interval: noise would become negative.",
         "argsort(tags)",
         "argsort(arrivals)",
     ),
-    ("future-used", "Measurements are used that have not arrived yet.", "arrivals <= now", "tags <= now"),
+    (
+        "future-used",
+        "Measurements are used that have not arrived yet.",
+        "arrivals <= now",
+        "tags <= now",
+    ),
     (
         "not-predicted-to-now",
-        "The estimate belongs to the last measurement's moment; predict it to the moment asked for.",
+        "The estimate belongs to the last measurement's moment; predict it to the moment asked "
+        "for.",
         "return move(m, P, now - time, q)",
         "return m, P",
     ),
@@ -213,14 +285,21 @@ WRONG_COSTS = edits(
     cost,
     (
         "truth-minus-estimate",
-        "The sign is the other way round: the error is the estimate less the truth, and the estimate is behind.",
+        "The sign is the other way round: the error is the estimate less the truth, and the "
+        "estimate is behind.",
         "-V * tau + a * tau**2 / 2, -a",
         "V * tau - a * tau**2 / 2, a",
     ),
-    ("constant-speed", "That is for a constant speed; the vehicle accelerates.", " + a * tau**2 / 2, -a * tau", ", 0 * V"),
+    (
+        "constant-speed",
+        "That is for a constant speed; the vehicle accelerates.",
+        " + a * tau**2 / 2, -a * tau",
+        ", 0 * V",
+    ),
     (
         "past-speed",
-        "The speed of the past is taken for the present one: the term of the acceleration has the wrong sign.",
+        "The speed of the past is taken for the present one: the term of the acceleration has the "
+        "wrong sign.",
         "+ a",
         "- a",
     ),
@@ -231,20 +310,27 @@ WRONG_COSTS = edits(
         "return",
         "tau = 2 * tau; return",
     ),
-    ("half-in-velocity", "The velocity is behind by the whole acceleration times the delay.", ", -a * tau", ", -a * tau / 2"),
+    (
+        "half-in-velocity",
+        "The velocity is behind by the whole acceleration times the delay.",
+        ", -a * tau",
+        ", -a * tau / 2",
+    ),
 )
 
 WRONG_FITS = edits(
     fit_clock,
     (
         "regression-other-way",
-        "The stamps are fitted on the edges; the errors are in the edges, so fit those on the stamps.",
+        "The stamps are fitted on the edges; the errors are in the edges, so fit those on the "
+        "stamps.",
         "return 1 / slope, -level / slope",
         "return tuple(np.polyfit(edges, stamps, 1))",
     ),
     (
         "inverse-clock",
-        "That is the map from stamps to moments; rate and shift tell what the clock shows at a given moment.",
+        "That is the map from stamps to moments; rate and shift tell what the clock shows at a "
+        "given moment.",
         "1 / slope, -level / slope",
         "slope, level",
     ),
@@ -254,7 +340,12 @@ WRONG_FITS = edits(
         "polyfit(stamps, edges, 1)",
         "polyfit(stamps[[0, -1]], edges[[0, -1]], 1)",
     ),
-    ("shift-only", "The rate is taken for 1.", "1 / slope, -level / slope", "1.0, (stamps - edges).mean()"),
+    (
+        "shift-only",
+        "The rate is taken for 1.",
+        "1 / slope, -level / slope",
+        "1.0, (stamps - edges).mean()",
+    ),
     (
         "through-the-origin",
         "The line goes through the origin: the clock is shifted too.",
@@ -263,15 +354,22 @@ WRONG_FITS = edits(
     ),
     (
         "shift-in-filter-time",
-        "The shift is in the filter's time and has the other sign: what does the clock show when the filter's time is 0?",
+        "The shift is in the filter's time and has the other sign: what does the clock show when "
+        "the filter's time is 0?",
         "-level / slope",
         "level",
     ),
-    ("not-divided", "The intercept of the inverse map has to be divided by its slope.", "-level / slope", "-level"),
+    (
+        "not-divided",
+        "The intercept of the inverse map has to be divided by its slope.",
+        "-level / slope",
+        "-level",
+    ),
     (
         "mean-of-ratios",
         "The rate is a mean of ratios of neighbours: short intervals rule it.",
         "return 1 / slope, -level / slope",
-        "rate = np.mean(np.diff(stamps) / np.diff(edges)); return rate, np.mean(stamps - rate * edges)",
+        "rate = np.mean(np.diff(stamps) / np.diff(edges)); return rate, np.mean(stamps - rate * "
+        "edges)",
     ),
 )

@@ -1,7 +1,8 @@
 """Questions of set l: sensors of different rates, late and by clocks of their own.
 
-What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
-`timing_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in mistakes.py.
+What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.
+Personal numbers are in `timing_numbers`; hidden arguments are others.  The keys are in keys.py, the
+known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,7 +15,15 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.l_time_tags.keys import correct, cost, dimension, fit_clock, fuse, move, own_time
+from kfcourse.exercises.l_time_tags.keys import (
+    correct,
+    cost,
+    dimension,
+    fit_clock,
+    fuse,
+    move,
+    own_time,
+)
 from kfcourse.exercises.l_time_tags.mistakes import (
     WRONG_CORRECTIONS,
     WRONG_COSTS,
@@ -28,7 +37,8 @@ from kfcourse.exercises.shared import covariance, personal
 
 
 def timing_numbers(exercise: Exercise) -> dict[str, float]:
-    """speed (m/s), acceleration (m/s^2), period, latency and jitter (s) and sigma (m) of the receiver, ratio of the rates."""
+    """speed (m/s), acceleration (m/s^2), period, latency and jitter (s) and sigma (m) of the
+    receiver, ratio of the rates."""
     found = personal(
         exercise,
         "l",
@@ -47,7 +57,8 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
 
 
 def dimension_arguments(exercise: Exercise) -> list[tuple]:
-    """Two series; in the second a whole period passes before the first measurement of the receiver."""
+    """Two series; in the second a whole period passes before the first measurement of the
+    receiver."""
     rng = exercise.rng("l1")
     # steps of a period: first, its neighbours and -first are different ones
     ratio, first = int(rng.choice((8, 9))), int(rng.integers(2, 4))
@@ -72,18 +83,27 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 def move_arguments(exercise: Exercise) -> list[tuple]:
     """Three laws, intervals and intensities."""
     rng = exercise.rng("l4")
-    return [(rng.normal(size=2), covariance(rng, 2), float(dt), float(rng.uniform(1.3, 2))) for dt in rng.uniform(0.3, 2.6, 3)]
+    return [
+        (rng.normal(size=2), covariance(rng, 2), float(dt), float(rng.uniform(1.3, 2)))
+        for dt in rng.uniform(0.3, 2.6, 3)
+    ]
 
 
 def fusion_arguments(exercise: Exercise) -> list[tuple]:
-    """Eight measurements, the first soon: the third and fourth arrive in the reverse order; the sixth has not arrived yet."""
+    """Eight measurements, the first soon: the third and fourth arrive in the reverse order; the
+    sixth has not arrived yet."""
     rng = exercise.rng("l5")
     tags = np.cumsum(rng.uniform([0.1, *[0.7] * 7], [0.4, *[1.3] * 7]))
     arrivals = tags + rng.uniform(0.2, 0.5, 8)
     arrivals[2] = arrivals[3] + rng.uniform(0.1, 0.3)
     now = arrivals[7] + 0.1
     arrivals[5] = now + 0.2
-    m, P, q, r = np.array([2.0, 3.0]), covariance(rng, 2), float(rng.uniform(0.3, 0.6)), float(rng.uniform(0.5, 0.9))
+    m, P, q, r = (
+        np.array([2.0, 3.0]),
+        covariance(rng, 2),
+        float(rng.uniform(0.3, 0.6)),
+        float(rng.uniform(0.5, 0.9)),
+    )
     values = m[0] + m[1] * tags + 0.4 * tags**2 + rng.normal(size=8)
     order = np.argsort(arrivals)
     return [(tags[order], arrivals[order], values[order], m, P, q, r, float(now))]
@@ -107,7 +127,8 @@ QUESTIONS = (
         dimension,
         dimension_arguments,
         WRONG_DIMENSIONS,
-        advice="Write out k = 0, 1, 2, ... for a ratio of three and a first step of four, and count by hand.",
+        advice="Write out k = 0, 1, 2, ... for a ratio of three and a first step of four, and "
+        "count by hand.",
         axes=("step",),
     ),
     Question(
@@ -128,7 +149,8 @@ QUESTIONS = (
         WRONG_CORRECTIONS,
         ("m", "P"),
         advice=(
-            "Choose the components that are there first, of everything that has a component for each; then "
+            "Choose the components that are there first, of everything that has a component for "
+            "each; then "
             "it is the usual correction."
         ),
     ),
@@ -140,7 +162,8 @@ QUESTIONS = (
         move_arguments,
         WRONG_MOVES,
         ("m", "P"),
-        advice="Two intervals one after the other must give the same as the whole one: try it with your Q.",
+        advice="Two intervals one after the other must give the same as the whole one: try it "
+        "with your Q.",
     ),
     Question(
         "l5",
@@ -151,7 +174,8 @@ QUESTIONS = (
         WRONG_FUSIONS,
         ("m", "P"),
         advice=(
-            "Draw the times on a line: captured, arrived, now. Which measurements may be used, in which "
+            "Draw the times on a line: captured, arrived, now. Which measurements may be used, in "
+            "which "
             "order, and over which intervals do you move?"
         ),
     ),
@@ -163,7 +187,8 @@ QUESTIONS = (
         lambda e: [sp.symbols("V a tau", positive=True)],
         WRONG_COSTS,
         ("position", "velocity"),
-        advice="Expand s(-tau) and its derivative for a motion that you can follow by hand, such as V = 0.",
+        advice="Expand s(-tau) and its derivative for a motion that you can follow by hand, such "
+        "as V = 0.",
     ),
     Question(
         "l7",
@@ -173,7 +198,10 @@ QUESTIONS = (
         fit_arguments,
         WRONG_FITS,
         ("rate", "shift"),
-        advice=("Which of the two has an error? That one is the target of the fit; then solve the line for the other."),
+        advice=(
+            "Which of the two has an error? That one is the target of the fit; then solve the "
+            "line for the other."
+        ),
     ),
 )
 

@@ -1,4 +1,5 @@
-"""Keys of set m: a look back, step by step; the likelihood of an innovation, one round of EM; a gate and a weight."""
+"""Keys of set m: a look back, step by step; the likelihood of an innovation, one round of EM; a
+gate and a weight."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ def neighbours(p: Array, A: Array, Q: Array) -> tuple[Array, Array]:
     return cross, cross @ np.linalg.inv(A @ p @ A.T + Q)
 
 
-def step_back(z: Array, p: Array, ahead: Array, Psi: Array, later: Array, later_p: Array, S: Array) -> tuple[Array, Array]:
+def step_back(
+    z: Array, p: Array, ahead: Array, Psi: Array, later: Array, later_p: Array, S: Array
+) -> tuple[Array, Array]:
     """Mean and covariance given all, from those of the next step."""
     return z + S @ (later - ahead), p + S @ (later_p - Psi) @ S.T
 

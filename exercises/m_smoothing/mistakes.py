@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
-from kfcourse.exercises.m_smoothing.keys import gate, log_likelihood, neighbours, new_r, smooth, step_back, weight
+from kfcourse.exercises.m_smoothing.keys import (
+    gate,
+    log_likelihood,
+    neighbours,
+    new_r,
+    smooth,
+    step_back,
+    weight,
+)
 
 # -- m1: the gate
 
@@ -12,11 +20,17 @@ WRONG_GATES = edits(
     gate,
     (
         "other-side",
-        "That is the value that is exceeded with the probability beta; the gate lets the right ones pass with it.",
+        "That is the value that is exceeded with the probability beta; the gate lets the right "
+        "ones pass with it.",
         "1 - beta",
         "beta",
     ),
-    ("half-forgotten", "The exponent of the law of the radius has a half: a factor is missing.", "-2 *", "-1 *"),
+    (
+        "half-forgotten",
+        "The exponent of the law of the radius has a half: a factor is missing.",
+        "-2 *",
+        "-1 *",
+    ),
     (
         "radius",
         "That is the radius; the gate is on the square, nu^T F^-1 nu.",
@@ -42,7 +56,12 @@ WRONG_GATES = edits(
 SQUARE, VOLUME = "-(nu**2) / F / 2", " - sp.log(2 * sp.pi * F) / 2"
 WRONG_LOGARITHMS = edits(
     log_likelihood,
-    ("density", "That is the density itself; its logarithm is asked for.", SQUARE + VOLUME, f"sp.exp({SQUARE}{VOLUME})"),
+    (
+        "density",
+        "That is the density itself; its logarithm is asked for.",
+        SQUARE + VOLUME,
+        f"sp.exp({SQUARE}{VOLUME})",
+    ),
     (
         "volume-sign",
         "The larger F is, the flatter the density: the logarithm of F enters with the other sign.",
@@ -56,7 +75,12 @@ WRONG_LOGARITHMS = edits(
         "",
     ),
     ("constant-forgotten", "The factor 2 pi is missing.", "2 * sp.pi * F", "F"),
-    ("half-of-volume", "The factor before the exponent is a root: a half is missing.", "sp.pi * F) / 2", "sp.pi * F)"),
+    (
+        "half-of-volume",
+        "The factor before the exponent is a root: a half is missing.",
+        "sp.pi * F) / 2",
+        "sp.pi * F)",
+    ),
     ("half-of-square", "The half of the exponent is missing.", " / F / 2", " / F"),
     (
         "root-of-F",
@@ -71,28 +95,50 @@ WRONG_LOGARITHMS = edits(
 
 WRONG_PAIRS = edits(
     neighbours,
-    ("A-not-transposed", "A stands on the right of p, and there it is transposed.", "cross = p @ A.T", "cross = p @ A"),
+    (
+        "A-not-transposed",
+        "A stands on the right of p, and there it is transposed.",
+        "cross = p @ A.T",
+        "cross = p @ A",
+    ),
     (
         "carried-twice",
         "What becomes of p in a step stands there; only one of the two states has moved.",
         "cross = p",
         "cross = A @ p",
     ),
-    ("A-forgotten", "The object is missing: the next state is not this one.", "cross = p @ A.T", "cross = p"),
+    (
+        "A-forgotten",
+        "The object is missing: the next state is not this one.",
+        "cross = p @ A.T",
+        "cross = p",
+    ),
     (
         "Q-forgotten",
-        "The noise of the object is missing where the gain is divided: x_{k+1} is not known from x_k alone.",
+        "The noise of the object is missing where the gain is divided: x_{k+1} is not known from "
+        "x_k alone.",
         " + Q",
         "",
     ),
-    ("divided-by-p", "The gain is divided by the covariance of x_k; it corrects x_k by x_{k+1}.", "(A @ p @ A.T + Q)", "(p)"),
+    (
+        "divided-by-p",
+        "The gain is divided by the covariance of x_k; it corrects x_k by x_{k+1}.",
+        "(A @ p @ A.T + Q)",
+        "(p)",
+    ),
     (
         "divided-by-Q",
-        "The gain is divided by the noise of the object alone; what is not known of x_k belongs to the prediction too.",
+        "The gain is divided by the noise of the object alone; what is not known of x_k belongs "
+        "to the prediction too.",
         "A @ p @ A.T + Q",
         "Q",
     ),
-    ("not-carried", "p is added to Q as it is; the prediction's covariance has it carried by A.", "A @ p @ A.T", "p"),
+    (
+        "not-carried",
+        "p is added to Q as it is; the prediction's covariance has it carried by A.",
+        "A @ p @ A.T",
+        "p",
+    ),
     (
         "gain-multiplied",
         "The gain is multiplied by the covariance of the prediction; it is divided by it.",
@@ -118,20 +164,28 @@ WRONG_STEPS = edits(
     ),
     (
         "filtered-subtracted",
-        "The estimate of this step is subtracted; the prediction of the next one is what was expected.",
+        "The estimate of this step is subtracted; the prediction of the next one is what was "
+        "expected.",
         "later - ahead",
         "later - z",
     ),
-    ("correction-alone", "That is the correction alone; it is added to the estimate.", "z + S", "S"),
+    (
+        "correction-alone",
+        "That is the correction alone; it is added to the estimate.",
+        "z + S",
+        "S",
+    ),
     (
         "from-the-prediction",
-        "The correction is added to the prediction of the next step; it belongs to the estimate of this one.",
+        "The correction is added to the prediction of the next step; it belongs to the estimate "
+        "of this one.",
         "z + S",
         "ahead + S",
     ),
     (
         "covariance-sign",
-        "The two covariances are subtracted the wrong way round: a smoother is surer than its filter.",
+        "The two covariances are subtracted the wrong way round: a smoother is surer than its "
+        "filter.",
         "later_p - Psi",
         "Psi - later_p",
     ),
@@ -141,7 +195,12 @@ WRONG_STEPS = edits(
         "later_p - Psi",
         "-Psi",
     ),
-    ("nothing-explained", "What the next state explains is not subtracted.", "later_p - Psi", "later_p"),
+    (
+        "nothing-explained",
+        "What the next state explains is not subtracted.",
+        "later_p - Psi",
+        "later_p",
+    ),
     ("gain-once", "The gain acts from both sides on a covariance.", " @ S.T", ""),
 )
 
@@ -151,19 +210,22 @@ WRONG_RECORDS = edits(
     smooth,
     (
         "one-step-only",
-        "Each step is corrected by the filter's next estimate; take the smoothed one, which knows all the rest.",
+        "Each step is corrected by the filter's next estimate; take the smoothed one, which knows "
+        "all the rest.",
         "means[-1], covs[-1]",
         "z[k + 1], p[k + 1]",
     ),
     (
         "prediction-of-same-step",
-        "The prediction of the same step is subtracted; that of the next one is what x_{k+1} was expected to be.",
+        "The prediction of the same step is subtracted; that of the next one is what x_{k+1} was "
+        "expected to be.",
         "ahead[k + 1], Psi[k + 1]",
         "ahead[k], Psi[k]",
     ),
     (
         "from-the-prediction",
-        "The look back starts from the last prediction; the last estimate already knows all measurements.",
+        "The look back starts from the last prediction; the last estimate already knows all "
+        "measurements.",
         "[z[-1]], [p[-1]]",
         "[ahead[-1]], [Psi[-1]]",
     ),
@@ -175,7 +237,8 @@ WRONG_RECORDS = edits(
     ),
     (
         "gain-of-next-step",
-        "The gain is made of the covariance of the next step; it is that of the step to be corrected.",
+        "The gain is made of the covariance of the next step; it is that of the step to be "
+        "corrected.",
         "neighbours(p[k]",
         "neighbours(p[k + 1]",
     ),
@@ -191,7 +254,12 @@ WRONG_ROUNDS = edits(
         " + p",
         "",
     ),
-    ("variance-subtracted", "The smoother's uncertainty makes the mean square larger, not smaller.", " + p", " - p"),
+    (
+        "variance-subtracted",
+        "The smoother's uncertainty makes the mean square larger, not smaller.",
+        " + p",
+        " - p",
+    ),
     (
         "variance-everywhere",
         "The smoother's variance is averaged over all steps; only those with a measurement count.",
@@ -206,7 +274,8 @@ WRONG_ROUNDS = edits(
     ),
     (
         "missing-as-zero",
-        "A missing measurement is treated as the number 0; it tells nothing of the meter: leave its step out.",
+        "A missing measurement is treated as the number 0; it tells nothing of the meter: leave "
+        "its step out.",
         "there = np.isfinite(y)",
         "y = np.nan_to_num(y); there = np.isfinite(y)",
     ),
@@ -239,8 +308,18 @@ WRONG_WEIGHTS = edits(
         "inverse @ G @ p",
         "G @ p",
     ),
-    ("R-forgotten", "The residual is not compared with the noise: R is missing.", "r @ inverse @ r", "r @ r"),
-    ("correlation-forgotten", messages.CORRELATIONS_IGNORED, "r @ inverse @ r", "r @ (r / np.diag(R))"),
+    (
+        "R-forgotten",
+        "The residual is not compared with the noise: R is missing.",
+        "r @ inverse @ r",
+        "r @ r",
+    ),
+    (
+        "correlation-forgotten",
+        messages.CORRELATIONS_IGNORED,
+        "r @ inverse @ r",
+        "r @ (r / np.diag(R))",
+    ),
     (
         "components-of-state",
         "The state's components are counted; the measurement's are asked for.",
@@ -249,7 +328,8 @@ WRONG_WEIGHTS = edits(
     ),
     (
         "components-forgotten",
-        "The number of components is missing above the line: a measurement that fits would not count in full.",
+        "The number of components is missing above the line: a measurement that fits would not "
+        "count in full.",
         "s + len(r)",
         "s",
     ),

@@ -1,7 +1,8 @@
-"""Questions of set m: looking back, what a record tells of its model, measurements that are not believed.
+"""Questions of set m: looking back, what a record tells of its model, measurements that are not
+believed.
 
-m2 is answered with a formula in the symbols of its arguments, the others with numbers.  Personal numbers are in
-`record_numbers`; hidden arguments are others.
+m2 is answered with a formula in the symbols of its arguments, the others with numbers.  Personal
+numbers are in `record_numbers`; hidden arguments are others.
 """
 
 from __future__ import annotations
@@ -14,7 +15,15 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.m_smoothing.keys import gate, log_likelihood, neighbours, new_r, smooth, step_back, weight
+from kfcourse.exercises.m_smoothing.keys import (
+    gate,
+    log_likelihood,
+    neighbours,
+    new_r,
+    smooth,
+    step_back,
+    weight,
+)
 from kfcourse.exercises.m_smoothing.mistakes import (
     WRONG_GATES,
     WRONG_LOGARITHMS,
@@ -31,7 +40,8 @@ from kfcourse.linear.system import LinearSystem
 
 
 def record_numbers(exercise: Exercise) -> dict[str, float]:
-    """Variances q of the level's steps and r of the meter, and the share of measurements that are missing."""
+    """Variances q of the level's steps and r of the meter, and the share of measurements that are
+    missing."""
     return personal(exercise, "m", q=(1.0, 0.5, 2), r=(9.0, 4, 16), missing=(0.2, 0.1, 0.3))
 
 
@@ -67,10 +77,14 @@ def step_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def record_arguments(exercise: Exercise) -> list[tuple]:
-    """What a Kalman filter leaves of seven steps: one component measured, one measurement missing."""
+    """What a Kalman filter leaves of seven steps: one component measured, one measurement
+    missing."""
     rng = exercise.rng("m5")
     p, A, Q = _system(rng)
-    system, law = LinearSystem(A, np.array([[1.0, 0.3]]), Q, np.array([[0.5]])), Gaussian(rng.normal(size=2) + 1, 3 * p)
+    system, law = (
+        LinearSystem(A, np.array([[1.0, 0.3]]), Q, np.array([[0.5]])),
+        Gaussian(rng.normal(size=2) + 1, 3 * p),
+    )
     rows = []
     for k in range(7):
         after = law if k == 3 else correct(system, law, rng.normal(size=1) * 2)
@@ -96,7 +110,13 @@ def weight_arguments(exercise: Exercise) -> list[tuple]:
         G = np.array([[1.0, 0.4, -0.6], [-0.3, 1.2, 0.5]]) + 0.1 * rng.normal(size=(2, 3))
         R = np.array([[1.0, 0.5], [0.5, 0.8]]) * rng.uniform(0.5, 0.8)
         found.append(
-            (far * (np.array([0.9, -0.7]) + 0.2 * rng.random(2)), R, G, covariance(rng, 3, 0.5), float(rng.uniform(3, 6)))
+            (
+                far * (np.array([0.9, -0.7]) + 0.2 * rng.random(2)),
+                R,
+                G,
+                covariance(rng, 3, 0.5),
+                float(rng.uniform(3, 6)),
+            )
         )
     return found
 
@@ -128,7 +148,8 @@ QUESTIONS = (
         neighbour_arguments,
         WRONG_PAIRS,
         ("covariance", "gain"),
-        advice="Write x_{k+1} = A x_k + v, subtract the means, multiply by the error of x_k on the left, and take the mean.",
+        advice="Write x_{k+1} = A x_k + v, subtract the means, multiply by the error of x_k on "
+        "the left, and take the mean.",
     ),
     Question(
         "m4",
@@ -138,7 +159,8 @@ QUESTIONS = (
         step_arguments,
         WRONG_STEPS,
         ("mean", "covariance"),
-        advice="If the later law is just the prediction, nothing has been learned, and the law of this step must stay.",
+        advice="If the later law is just the prediction, nothing has been learned, and the law of "
+        "this step must stay.",
     ),
     Question(
         "m5",
@@ -159,7 +181,8 @@ QUESTIONS = (
         new_r,
         round_arguments,
         WRONG_ROUNDS,
-        advice="What would r be if the states were seen? Then take the mean of that over what the smoother does not know.",
+        advice="What would r be if the states were seen? Then take the mean of that over what the "
+        "smoother does not know.",
     ),
     Question(
         "m7",

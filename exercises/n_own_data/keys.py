@@ -1,4 +1,5 @@
-"""Keys of set n: intervals, their noise, missing measurements, a gate, held-out measurements, neighbouring innovations."""
+"""Keys of set n: intervals, their noise, missing measurements, a gate, held-out measurements,
+neighbouring innovations."""
 
 from __future__ import annotations
 

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
-from kfcourse.exercises.n_own_data.keys import follow, gate, held_out, intervals, neighbours, process_noise
+from kfcourse.exercises.n_own_data.keys import (
+    follow,
+    gate,
+    held_out,
+    intervals,
+    neighbours,
+    process_noise,
+)
 
 # -- n1: intervals; n2: the noise of an interval
 
 ALIKE = "All steps are made alike; the intervals of the record are not."
-KEPT = "That is an acceleration which keeps its value over the interval; here it is white, and it changes all the time."
+KEPT = (
+    "That is an acceleration which keeps its value over the interval; here it is white, and it "
+    "changes all the time."
+)
 LAST = "np.append(steps, steps[-1])"
 WRONG_INTERVALS = edits(
     intervals,
@@ -25,10 +35,20 @@ WRONG_INTERVALS = edits(
         LAST,
         "np.append(0, steps)",
     ),
-    ("zero-last", "The last step has no length; give it that of the one before.", LAST, "np.append(steps, 0)"),
+    (
+        "zero-last",
+        "The last step has no length; give it that of the one before.",
+        LAST,
+        "np.append(steps, 0)",
+    ),
     ("mean", ALIKE, LAST, "np.full(len(times), steps.mean())"),
     ("median", ALIKE, LAST, "np.full(len(times), np.median(steps))"),
-    ("times", "That is the time since the first row, not the length of each step.", LAST, "times - times[0]"),
+    (
+        "times",
+        "That is the time since the first row, not the length of each step.",
+        LAST,
+        "times - times[0]",
+    ),
 )
 
 Q = "[[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]"
@@ -54,7 +74,12 @@ WRONG_NOISES = edits(
         "    Q = ",
         "    dt = np.full_like(dt, dt.mean()); Q = ",
     ),
-    ("unit-interval", "All intervals are taken for 1; each row has its own.", "    Q = ", "    dt = np.ones_like(dt); Q = "),
+    (
+        "unit-interval",
+        "All intervals are taken for 1; each row has its own.",
+        "    Q = ",
+        "    dt = np.ones_like(dt); Q = ",
+    ),
     (
         "correlation-sign",
         "A push forwards moves forwards: the covariance is positive.",
@@ -76,7 +101,8 @@ WRONG_FILTERS = edits(
     ("missing-as-zero", messages.MISSING_AS_ZERO, "enumerate(y)", "enumerate(np.nan_to_num(y))"),
     (
         "missing-as-expected",
-        "A gap is filled by what was expected: the covariance then shrinks as if it had been measured.",
+        "A gap is filled by what was expected: the covariance then shrinks as if it had been "
+        "measured.",
         "if not missing:",
         "if missing: y_k = m[0]\n        if True:",
     ),
@@ -92,17 +118,42 @@ WRONG_FILTERS = edits(
         "steps[k - 1]",
         "steps[min(k, len(steps) - 1)]",
     ),
-    ("mean-interval", "All intervals are taken for their mean; each has its own.", "steps[k - 1]", "steps.mean()"),
-    ("predicted-first", messages.PREDICTED_FIRST, "if k > 0", "if True", "steps[k - 1]", "steps[max(k - 1, 0)]"),
-    ("noise-forgotten", "The noise of the state is missing in the prediction.", " + process_noise(np.array([dt]), q)[0]", ""),
-    ("covariance-not-carried", "The motion carries the covariance, too: A P A^T.", "A @ P @ A.T", "P"),
+    (
+        "mean-interval",
+        "All intervals are taken for their mean; each has its own.",
+        "steps[k - 1]",
+        "steps.mean()",
+    ),
+    (
+        "predicted-first",
+        messages.PREDICTED_FIRST,
+        "if k > 0",
+        "if True",
+        "steps[k - 1]",
+        "steps[max(k - 1, 0)]",
+    ),
+    (
+        "noise-forgotten",
+        "The noise of the state is missing in the prediction.",
+        " + process_noise(np.array([dt]), q)[0]",
+        "",
+    ),
+    (
+        "covariance-not-carried",
+        "The motion carries the covariance, too: A P A^T.",
+        "A @ P @ A.T",
+        "P",
+    ),
     ("innovation-sign", messages.INNOVATION_SIGN, "y_k - m[0]", "m[0] - y_k"),
     ("noise-squared", messages.NOISE_SQUARED, "P[0, 0] + r", "P[0, 0] + r**2"),
 )
 
 # -- n4: the gate
 
-SIZE, CHI = "np.sum(nu * np.linalg.solve(F, nu[..., None])[..., 0], axis=-1)", "chdtri(degrees, 1 - probability)"
+SIZE, CHI = (
+    "np.sum(nu * np.linalg.solve(F, nu[..., None])[..., 0], axis=-1)",
+    "chdtri(degrees, 1 - probability)",
+)
 WRONG_GATES = edits(
     gate,
     (
@@ -123,7 +174,12 @@ WRONG_GATES = edits(
         "np.linalg.solve(F, nu[..., None])",
         "(F @ nu[..., None])",
     ),
-    ("one-degree", "The edge is that of one component; a measurement has more.", "chdtri(degrees", "chdtri(1"),
+    (
+        "one-degree",
+        "The edge is that of one component; a measurement has more.",
+        "chdtri(degrees",
+        "chdtri(1",
+    ),
     (
         "degree-less",
         "The edge has one degree of freedom too few; nothing was fitted to this measurement.",
@@ -180,13 +236,15 @@ WRONG_JUDGEMENTS = edits(
     ),
     (
         "claimed-per-component",
-        "What is claimed is taken for one component; the variance of a distance is the sum over them.",
+        "What is claimed is taken for one component; the variance of a distance is the sum over "
+        "them.",
         "np.sqrt(claimed.mean())",
         "np.sqrt(claimed.mean() / F.shape[-1])",
     ),
     (
         "ratio-of-means",
-        "One ratio of two means; each error is compared with its own covariance, and then averaged.",
+        "One ratio of two means; each error is compared with its own covariance, and then "
+        "averaged.",
         "nis.mean()",
         "size.mean() / claimed.mean()",
     ),
@@ -215,18 +273,30 @@ WRONG_NEIGHBOURS = edits(
     ),
     (
         "neighbours-in-rows",
-        "Pairs with a gap between them are left out; the next one that was measured is the neighbour.",
+        "Pairs with a gap between them are left out; the next one that was measured is the "
+        "neighbour.",
         "float(np.mean(pairs))",
         "np.nanmean(white[:-1] * white[1:])",
     ),
-    ("not-normalised", "The innovations are not divided by their deviations.", "nu / np.sqrt(F)", "nu"),
+    (
+        "not-normalised",
+        "The innovations are not divided by their deviations.",
+        "nu / np.sqrt(F)",
+        "nu",
+    ),
     (
         "by-variance",
-        "The innovations are divided by their variances; by the deviations they get the variance 1.",
+        "The innovations are divided by their variances; by the deviations they get the variance "
+        "1.",
         "nu / np.sqrt(F)",
         "nu / F",
     ),
-    ("sum", "That is the sum of the products; divide by their number.", "np.mean(pairs)", "np.sum(pairs)"),
+    (
+        "sum",
+        "That is the sum of the products; divide by their number.",
+        "np.mean(pairs)",
+        "np.sum(pairs)",
+    ),
     (
         "own-product",
         "Each innovation is multiplied by itself; its neighbour belongs there.",

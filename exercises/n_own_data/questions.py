@@ -1,7 +1,8 @@
-"""Questions of set n: a record of one's own: intervals, missing cells, a gate, and judging a filter without a truth.
+"""Questions of set n: a record of one's own: intervals, missing cells, a gate, and judging a filter
+without a truth.
 
-Everything is answered with arrays.  Personal numbers are in `record_numbers`; hidden arguments are others.  The keys are in
-keys.py, the known mistakes in mistakes.py.
+Everything is answered with arrays.  Personal numbers are in `record_numbers`; hidden arguments are
+others.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -13,7 +14,14 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.n_own_data.keys import follow, gate, held_out, intervals, neighbours, process_noise
+from kfcourse.exercises.n_own_data.keys import (
+    follow,
+    gate,
+    held_out,
+    intervals,
+    neighbours,
+    process_noise,
+)
 from kfcourse.exercises.n_own_data.mistakes import (
     WRONG_FILTERS,
     WRONG_GATES,
@@ -26,7 +34,8 @@ from kfcourse.exercises.shared import covariance, personal
 
 
 def record_numbers(exercise: Exercise) -> dict[str, float]:
-    """q (m^2/s^3), sigma (m), shortest and longest interval (s), part of outliers and their size (m), part missing."""
+    """q (m^2/s^3), sigma (m), shortest and longest interval (s), part of outliers and their size
+    (m), part missing."""
     return personal(
         exercise,
         "n",
@@ -63,11 +72,17 @@ def gate_arguments(exercise: Exercise) -> list[tuple]:
 def held_out_arguments(exercise: Exercise) -> list[tuple]:
     """Seven errors in the plane, each with its own covariance."""
     rng = exercise.rng("n5")
-    return [(1 + 3 * rng.normal(size=(7, 2)), np.stack([covariance(rng, 2) * scale for scale in rng.uniform(0.5, 4, 7)]))]
+    return [
+        (
+            1 + 3 * rng.normal(size=(7, 2)),
+            np.stack([covariance(rng, 2) * scale for scale in rng.uniform(0.5, 4, 7)]),
+        )
+    ]
 
 
 def neighbour_arguments(exercise: Exercise) -> list[tuple]:
-    """Twenty innovations of unequal variances, each like the one before; four are missing, two of them in a row."""
+    """Twenty innovations of unequal variances, each like the one before; four are missing, two of
+    them in a row."""
     rng = exercise.rng("n6")
     F = rng.uniform(1.5, 6, 20)
     white = rng.normal(size=21)
@@ -94,7 +109,8 @@ QUESTIONS = (
         process_noise,
         lambda e: [(e.rng("n2").uniform(0.3, 2.6, 4), float(e.rng("n2").uniform(1.3, 2)))],
         WRONG_NOISES,
-        advice="Two intervals one after the other must add as much as the whole one: A Q A^T + Q. Try it with your Q.",
+        advice="Two intervals one after the other must add as much as the whole one: A Q A^T + Q. "
+        "Try it with your Q.",
     ),
     Question(
         "n3",
@@ -104,7 +120,8 @@ QUESTIONS = (
         filter_arguments,
         WRONG_FILTERS,
         ("z", "p"),
-        advice="Follow three rows by hand, the second of them empty: correct, predict, predict, correct.",
+        advice="Follow three rows by hand, the second of them empty: correct, predict, predict, "
+        "correct.",
         axes=("step",),
     ),
     Question(
@@ -115,7 +132,8 @@ QUESTIONS = (
         gate_arguments,
         WRONG_GATES,
         ("size", "edge"),
-        advice="For a single component the size is nu^2 / F, and the edge for 95 % is 1.96 squared: try that first.",
+        advice="For a single component the size is nu^2 / F, and the edge for 95 % is 1.96 "
+        "squared: try that first.",
     ),
     Question(
         "n5",
@@ -125,7 +143,8 @@ QUESTIONS = (
         held_out_arguments,
         WRONG_JUDGEMENTS,
         ("rms", "claimed", "nis"),
-        advice="Take F = I for all: then the second is the root of 2, and the third is the square of the first.",
+        advice="Take F = I for all: then the second is the root of 2, and the third is the square "
+        "of the first.",
     ),
     Question(
         "n6",
@@ -135,7 +154,8 @@ QUESTIONS = (
         neighbour_arguments,
         WRONG_NEIGHBOURS,
         ("correlation", "deviation"),
-        advice="First make a list without gaps, of innovations with the variance 1; then count the pairs in it.",
+        advice="First make a list without gaps, of innovations with the variance 1; then count "
+        "the pairs in it.",
     ),
 )
 

@@ -1,6 +1,8 @@
-"""Questions of set o: which mode is it?  Probabilities of modes, laws merged, the IMM's mixing, a decision.
+"""Questions of set o: which mode is it?  Probabilities of modes, laws merged, the IMM's mixing, a
+decision.
 
-The set has models of its own; hidden numbers are drawn here.  The keys are in keys.py, the known mistakes in mistakes.py.
+The set has models of its own; hidden numbers are drawn here.  The keys are in keys.py, the known
+mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -13,7 +15,17 @@ from kfcourse.checks.derived import Derivation, Posed
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import ForVariant, Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.o_modes.keys import GIVEN, SPREAD, chain, decide, merged, mixed, posterior, spread_setting, two_steps
+from kfcourse.exercises.o_modes.keys import (
+    GIVEN,
+    SPREAD,
+    chain,
+    decide,
+    merged,
+    mixed,
+    posterior,
+    spread_setting,
+    two_steps,
+)
 from kfcourse.exercises.o_modes.mistakes import (
     WRONG_CHAINS,
     WRONG_DECISIONS,
@@ -27,7 +39,8 @@ from kfcourse.laws import Array
 
 
 def modes_numbers(exercise: Exercise) -> dict[str, float]:
-    """a, q of the object; C of the faulty meter; how often it fails and is repaired; the cost of an overlooked fault."""
+    """a, q of the object; C of the faulty meter; how often it fails and is repaired; the cost of an
+    overlooked fault."""
     return personal(
         exercise,
         "o",
@@ -48,14 +61,16 @@ def probabilities(rng: np.random.Generator, size: int) -> Array:
 
 def transitions(rng: np.random.Generator, size: int) -> Array:
     """Rows sum to one, columns do not."""
-    return np.array([probabilities(rng, size) + row * np.eye(size)[row] / (1 + row) for row in range(size)]) / (
-        1 + np.arange(size)[:, None] / (1 + np.arange(size)[:, None])
-    )
+    return np.array(
+        [probabilities(rng, size) + row * np.eye(size)[row] / (1 + row) for row in range(size)]
+    ) / (1 + np.arange(size)[:, None] / (1 + np.arange(size)[:, None]))
 
 
 def laws(rng: np.random.Generator, size: int) -> tuple[Array, Array]:
     """Means and covariances of normal laws that differ."""
-    return 2 + 1.5 * rng.normal(size=(size, 2)), np.array([covariance(rng, 2, rng.uniform(0.5, 2)) for _ in range(size)])
+    return 2 + 1.5 * rng.normal(size=(size, 2)), np.array(
+        [covariance(rng, 2, rng.uniform(0.5, 2)) for _ in range(size)]
+    )
 
 
 def chains(exercise: Exercise) -> list[tuple]:
@@ -66,7 +81,13 @@ def chains(exercise: Exercise) -> list[tuple]:
 def measured(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("o2")
     return [
-        (probabilities(rng, size), rng.uniform(2, 4), rng.uniform(0.5, 2.5, size), rng.uniform(0.8, 5, size)) for size in (2, 3)
+        (
+            probabilities(rng, size),
+            rng.uniform(2, 4),
+            rng.uniform(0.5, 2.5, size),
+            rng.uniform(0.8, 5, size),
+        )
+        for size in (2, 3)
     ]
 
 
@@ -94,7 +115,10 @@ def to_mix(exercise: Exercise) -> list[tuple]:
 
 def to_decide(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("o7")
-    return [(rng.uniform(0.02, 0.98, 40), rng.uniform(2, 4), rng.uniform(0.5, 1.2)), (rng.uniform(0.02, 0.98, 40), 0.8, 2.5)]
+    return [
+        (rng.uniform(0.02, 0.98, 40), rng.uniform(2, 4), rng.uniform(0.5, 1.2)),
+        (rng.uniform(0.02, 0.98, 40), 0.8, 2.5),
+    ]
 
 
 QUESTIONS = (
@@ -106,7 +130,8 @@ QUESTIONS = (
         chains,
         WRONG_CHAINS,
         ("c", "w"),
-        advice="Draw an arrow for each pair of modes and write its probability on it; then add up what arrives.",
+        advice="Draw an arrow for each pair of modes and write its probability on it; then add up "
+        "what arrives.",
     ),
     Question(
         "o2",
@@ -115,7 +140,8 @@ QUESTIONS = (
         posterior,
         measured,
         WRONG_POSTERIORS,
-        advice="Two modes expect the same: what decides between them if y is just what was expected, and if it is far off?",
+        advice="Two modes expect the same: what decides between them if y is just what was "
+        "expected, and if it is far off?",
     ),
     Question(
         "o3",
@@ -125,7 +151,8 @@ QUESTIONS = (
         two_measurements,
         WRONG_STEPS,
         ("after_first", "after_second"),
-        advice="After each line write down what you hold: probabilities, means, variances. Which of them has y_0 changed?",
+        advice="After each line write down what you hold: probabilities, means, variances. Which "
+        "of them has y_0 changed?",
     ),
     Question(
         "o4",
@@ -135,7 +162,8 @@ QUESTIONS = (
         to_merge,
         WRONG_MERGED,
         ("mean", "covariance"),
-        advice="Two laws without any variance, at +1 and -1, equally likely: which variance has their mixture?",
+        advice="Two laws without any variance, at +1 and -1, equally likely: which variance has "
+        "their mixture?",
     ),
     Derivation(
         "o5",
@@ -154,7 +182,8 @@ QUESTIONS = (
         to_mix,
         WRONG_MIXED,
         ("c", "means", "covariances"),
-        advice="For one mode: which modes can it come from, with which weights, and what is the mixture of their laws?",
+        advice="For one mode: which modes can it come from, with which weights, and what is the "
+        "mixture of their laws?",
     ),
     Question(
         "o7",
@@ -164,7 +193,8 @@ QUESTIONS = (
         to_decide,
         WRONG_DECISIONS,
         ("called", "loss"),
-        advice="For one probability: what does it cost on the average to say faulty, and what to say sound?",
+        advice="For one probability: what does it cost on the average to say faulty, and what to "
+        "say sound?",
     ),
 )
 

@@ -1,4 +1,5 @@
-"""Keys of set p: the right formulas; test_references.py holds them against the package's moments, derivatives, regressions."""
+"""Keys of set p: the right formulas; test_references.py holds them against the package's moments,
+derivatives, regressions."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ def noise_intensity(z1: sp.Expr, z2: sp.Expr, p11: sp.Expr, p12: sp.Expr, p22: s
     return z1**2 + p11
 
 
-def meter_variance(m1: sp.Expr, m2: sp.Expr, d11: sp.Expr, d12: sp.Expr, d22: sp.Expr) -> sp.ImmutableMatrix:
+def meter_variance(
+    m1: sp.Expr, m2: sp.Expr, d11: sp.Expr, d12: sp.Expr, d22: sp.Expr
+) -> sp.ImmutableMatrix:
     """F of y = (x1^2 + w1, x2 + w2) over x ~ N(m, d), D[w] = I."""
     noise, cross = 1, 2 * m1 * d12
     first = 4 * m1**2 * d11 + 2 * d11**2

@@ -1,4 +1,5 @@
-"""Known mistakes of set p: first of all the slips themselves, then others that are made while repairing them."""
+"""Known mistakes of set p: first of all the slips themselves, then others that are made while
+repairing them."""
 
 from __future__ import annotations
 
@@ -34,7 +35,12 @@ WRONG_SECOND = edits(
         "(z**2 + p)",
         "p",
     ),
-    ("noise-squared", "q is the variance of the noise already; it is not squared again.", "+ q", "+ q**2"),
+    (
+        "noise-squared",
+        "q is the variance of the noise already; it is not squared again.",
+        "+ q",
+        "+ q**2",
+    ),
     (
         "noise-deviation",
         "The root of q stands in the equation; what does it add to a mean square?",
@@ -79,7 +85,12 @@ WRONG_SCALED = edits(
 WRONG_INTENSITIES = edits(
     noise_intensity,
     ("as-printed", AS_PRINTED, "+ p11", "+ p22"),
-    ("tangent", "That is the value at the mean; the square is averaged over the law.", " + p11", ""),
+    (
+        "tangent",
+        "That is the value at the mean; the square is averaged over the law.",
+        " + p11",
+        "",
+    ),
     (
         "other-component",
         "That belongs to the other component: which one multiplies the noise?",
@@ -141,13 +152,15 @@ WRONG_METERS = edits(
     ("fourth-moment", FOURTH, "2 * d11**2", "d11**2"),
     (
         "product-rule",
-        "The covariance of a square with another component has a factor 2: both factors of the square vary.",
+        "The covariance of a square with another component has a factor 2: both factors of the "
+        "square vary.",
         "2 * m1",
         "m1",
     ),
     (
         "plain-covariance",
-        "Off the diagonal stands the covariance of the components themselves; the first is measured squared.",
+        "Off the diagonal stands the covariance of the components themselves; the first is "
+        "measured squared.",
         "2 * m1 * d12",
         "d12",
     ),
@@ -158,7 +171,8 @@ WRONG_SLOPES = edits(
     ("as-printed", AS_PRINTED, " - kappa * sp.cos(x2)", "", " - kappa * sp.sin(x2)", ""),
     (
         "other-lift",
-        "The term with the lift has the other sign: which sign has it in the meter, and which one does its derivative bring?",
+        "The term with the lift has the other sign: which sign has it in the meter, and which one "
+        "does its derivative bring?",
         "- kappa * sp.cos",
         "+ kappa * sp.cos",
         "- kappa * sp.sin",
@@ -197,7 +211,11 @@ WRONG_MATRICES = edits(
         "(error, sigma)[0]",
         "(sigma, error)[0]",
     ),
-    ("about-zero", "The moments are taken about zero; the offset is there for the means.", *MOMENTS),
+    (
+        "about-zero",
+        "The moments are taken about zero; the offset is there for the means.",
+        *MOMENTS,
+    ),
     (
         "components-apart",
         "Each component has a regression of its own; sigma's components are correlated.",
@@ -210,7 +228,12 @@ WRONG_MATRICES = edits(
         " @ np.linalg.pinv(own, hermitian=True)",
         "",
     ),
-    ("different-divisors", messages.DIFFERENT_DIVISORS, "t.T @ r / len(t)", "t.T @ r / (len(t) - 1)"),
+    (
+        "different-divisors",
+        messages.DIFFERENT_DIVISORS,
+        "t.T @ r / len(t)",
+        "t.T @ r / (len(t) - 1)",
+    ),
     (
         "inverse-on-the-left",
         "The inverse stands on the wrong side: the order of matrices matters.",
@@ -219,7 +242,10 @@ WRONG_MATRICES = edits(
     ),
 )
 
-MEAN, WHOLE = "chi + x_0.mean(axis=0) - x.mean(axis=0)", "T + np.cov(x_0.T, ddof=0) - np.cov(x.T, ddof=0)"
+MEAN, WHOLE = (
+    "chi + x_0.mean(axis=0) - x.mean(axis=0)",
+    "T + np.cov(x_0.T, ddof=0) - np.cov(x.T, ddof=0)",
+)
 WRONG_FITS = edits(
     coefficients,
     ("as-printed", AS_PRINTED, "chi, T\n", f"{MEAN}, {WHOLE}\n"),
@@ -243,7 +269,12 @@ WRONG_FITS = edits(
         "chi, T\n",
         "chi, T * len(x) / (len(x) - 1)\n",
     ),
-    ("error-for-residual", messages.ERROR_FOR_RESIDUAL, "chi, T\n", "chi, np.cov((x - z).T, ddof=0).reshape(T.shape)\n"),
+    (
+        "error-for-residual",
+        messages.ERROR_FOR_RESIDUAL,
+        "chi, T\n",
+        "chi, np.cov((x - z).T, ddof=0).reshape(T.shape)\n",
+    ),
     ("offset-forgotten", messages.OFFSET_FORGOTTEN, *OFFSET),
 )
 
@@ -251,7 +282,8 @@ WRONG_FITS = edits(
 
 MODES = (
     "mean, variance = x.mean(), x.var()",
-    "parts = [x[mode == i] for i in np.unique(mode)]; share = [len(part) / len(x) for part in parts]; "
+    "parts = [x[mode == i] for i in np.unique(mode)]; share = [len(part) / len(x) for part in "
+    "parts]; "
     "means, variances = list(map(np.mean, parts)), list(map(np.var, parts))",
     "mean, variance\n",
 )
@@ -271,6 +303,11 @@ WRONG_MOMENTS = edits(
         "np.mean(means), np.mean(variances) + np.var(means)",
     ),
     ("about-zero", messages.ABOUT_ZERO, "x.var()", "(x**2).mean()"),
-    ("first-mode", "Only one mode is looked at.", "    mean, variance =", "    x = x[mode == 0]; mean, variance ="),
+    (
+        "first-mode",
+        "Only one mode is looked at.",
+        "    mean, variance =",
+        "    x = x[mode == 0]; mean, variance =",
+    ),
     ("divided-by-N-1", DIVIDED_BY_LESS, "x.var()", "x.var(ddof=1)"),
 )

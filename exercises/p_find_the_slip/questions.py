@@ -1,7 +1,7 @@
 """Questions of set p: a formula with a slip is shown, and the right one is typed.
 
-The slips are those of a real program; the hidden arguments are made here.  The keys are in keys.py, the known mistakes, the slips
-first, in mistakes.py.
+The slips are those of a real program; the hidden arguments are made here.  The keys are in keys.py,
+the known mistakes, the slips first, in mistakes.py.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ RUNS = 50
 
 def ensemble(rng: np.random.Generator, n: int) -> Array:
     """Correlated components with means that are not zero, (N, n)."""
-    return rng.uniform(1, 3, n) + rng.normal(size=(RUNS, n)) @ np.linalg.cholesky(covariance(rng, n)).T
+    return (
+        rng.uniform(1, 3, n) + rng.normal(size=(RUNS, n)) @ np.linalg.cholesky(covariance(rng, n)).T
+    )
 
 
 def errors(exercise: Exercise) -> list[tuple]:
@@ -42,7 +44,12 @@ def errors(exercise: Exercise) -> list[tuple]:
     found = []
     for n in (1, 2):
         sigma = ensemble(rng, n)
-        found.append((sigma @ (0.6 * np.eye(n) + 0.3 * rng.normal(size=(n, n))) + 0.4 * ensemble(rng, n), sigma))
+        found.append(
+            (
+                sigma @ (0.6 * np.eye(n) + 0.3 * rng.normal(size=(n, n))) + 0.4 * ensemble(rng, n),
+                sigma,
+            )
+        )
     return found
 
 
@@ -107,7 +114,8 @@ QUESTIONS = (
         keys.meter_variance,
         lambda e: symbols("m1 m2 d11 d12 d22"),
         WRONG_METERS,
-        advice="Check with d = 0: what is left must be the noise alone. Then put x1 = m1 + a deviation, and multiply out.",
+        advice="Check with d = 0: what is left must be the noise alone. Then put x1 = m1 + a "
+        "deviation, and multiply out.",
     ),
     Question(
         "p5",
@@ -117,7 +125,8 @@ QUESTIONS = (
         lambda e: symbols("E kappa x2"),
         WRONG_SLOPES,
         ("first", "second"),
-        advice="Differentiate each of the four terms by itself, with a table of sines and cosines beside you.",
+        advice="Differentiate each of the four terms by itself, with a table of sines and cosines "
+        "beside you.",
     ),
     Question(
         "p6",
@@ -126,7 +135,8 @@ QUESTIONS = (
         keys.correction_matrix,
         errors,
         WRONG_MATRICES,
-        advice="What must be uncorrelated with sigma, if nothing better can be made of it? Write that as an equation for H.",
+        advice="What must be uncorrelated with sigma, if nothing better can be made of it? Write "
+        "that as an equation for H.",
     ),
     Question(
         "p7",
@@ -136,7 +146,8 @@ QUESTIONS = (
         steps,
         WRONG_FITS,
         ("Gamma", "chi", "T"),
-        advice="Take the mean of x - Gamma z - chi over the ensemble: it must be zero, and T is what is left of x.",
+        advice="Take the mean of x - Gamma z - chi over the ensemble: it must be zero, and T is "
+        "what is left of x.",
     ),
     Question(
         "p8",

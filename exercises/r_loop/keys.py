@@ -1,4 +1,5 @@
-"""Keys of set r: a tracking loop from its log-likelihood, its characteristic, slips by a double integral.
+"""Keys of set r: a tracking loop from its log-likelihood, its characteristic, slips by a double
+integral.
 
 The carrier is y = A cos(theta + phi) + n, D[n] = D, with the known phase theta.
 """
@@ -20,7 +21,8 @@ def discriminator(lam: Array, y: Array, theta: Array, A: float, sigma: float) ->
 
 
 def characteristic(Delta: sp.Expr, A: sp.Expr, D: sp.Expr) -> tuple[sp.Expr, ...]:
-    """U(Delta), its slope at zero, and the variance of the equivalent noise: u averaged over a period."""
+    """U(Delta), its slope at zero, and the variance of the equivalent noise: u averaged over a
+    period."""
     slope = A**2 / (2 * D)
     return slope * sp.sin(Delta), slope, 1 / slope
 
@@ -37,7 +39,8 @@ def lock_in(p: sp.Expr, A: sp.Expr, D: sp.Expr, T: sp.Expr) -> sp.Expr:
 
 
 def mean_time(variance: Array, q: float) -> Array:
-    """Mean number of steps to a slip, for each variance of the phase: both integrals over a period by sums."""
+    """Mean number of steps to a slip, for each variance of the phase: both integrals over a period
+    by sums."""
     x = 2 * np.pi * np.arange(POINTS) / POINTS
     V = (1 - np.cos(x)) / np.asarray(variance)[:, None]
     up, down = np.exp(V).mean(axis=1), np.exp(-V).mean(axis=1)

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
-from kfcourse.exercises.r_loop.keys import characteristic, discriminator, lock_in, mean_time, slips, steady
+from kfcourse.exercises.r_loop.keys import (
+    characteristic,
+    discriminator,
+    lock_in,
+    mean_time,
+    slips,
+    steady,
+)
 
 AMPLITUDE = "The amplitude enters twice: in the signal, and in its slope."
 SLOW = "That is the limit of a slow loop; the exact value is asked for."
 DISCRIMINANT = "Solve the quadratic equation once more: what stands under the root is wrong."
-AT_THE_END = "The runs that are off at the end are counted; one that has slipped and come back has slipped too."
+AT_THE_END = (
+    "The runs that are off at the end are counted; one that has slipped and come back "
+    "has slipped too."
+)
 
 # -- r1: the discriminator
 
@@ -17,13 +27,15 @@ WRONG_DISCRIMINATORS = edits(
     discriminator,
     (
         "innovation-sign",
-        "The sign is wrong: of the innovation, what came minus what was expected, or of the derivative of a cosine?",
+        "The sign is wrong: of the innovation, what came minus what was expected, or of the "
+        "derivative of a cosine?",
         "y - expected",
         "expected - y",
     ),
     (
         "slope-forgotten",
-        "That is the innovation over its variance; what would a change of the phase do to the signal?",
+        "That is the innovation over its variance; what would a change of the phase do to the "
+        "signal?",
         "slope * ",
         "",
     ),
@@ -75,13 +87,15 @@ WRONG_CHARACTERISTICS = edits(
     ("noise-squared", "D is a variance; it enters once.", "2 * D", "2 * D**2"),
     (
         "noise-of-meter",
-        "That is the noise of the meter, in squared volts; the equivalent noise is one of the phase.",
+        "That is the noise of the meter, in squared volts; the equivalent noise is one of the "
+        "phase.",
         "1 / slope",
         "D",
     ),
     (
         "double-angle",
-        "Its period is half of the carrier's; the loop has one stable zero in each period of the carrier.",
+        "Its period is half of the carrier's; the loop has one stable zero in each period of the "
+        "carrier.",
         "sp.sin(Delta)",
         "sp.sin(2 * Delta) / 2",
     ),
@@ -97,13 +111,15 @@ WRONG_STEADY = edits(
     ("discriminant", DISCRIMINANT, "+ 4 * q", "- 4 * q"),
     (
         "noises-swapped",
-        "Meter and object have changed places: q drives the phase, r is the noise of its measurement.",
+        "Meter and object have changed places: q drives the phase, r is the noise of its "
+        "measurement.",
         "    Psi =",
         "    q, r = r, q\n    Psi =",
     ),
     (
         "correction-forgotten",
-        "What stands after the correction is the variance before it; what does a correction do to it?",
+        "What stands after the correction is the variance before it; what does a correction do to "
+        "it?",
         "Psi - q",
         "Psi",
     ),
@@ -126,7 +142,8 @@ WRONG_RANGES = edits(
     ),
     (
         "period-multiplied",
-        "It grows with the period of the samples; the fewer corrections, the less the loop can follow.",
+        "It grows with the period of the samples; the fewer corrections, the less the loop can "
+        "follow.",
         "(2 * sp.pi * T)",
         "(2 * sp.pi) * T",
     ),
@@ -139,13 +156,15 @@ WRONG_RANGES = edits(
     ("gain-by-deviation", "p is a variance, and is the gain as it is.", "p * A", "sp.sqrt(p) * A"),
     (
         "half-forgotten",
-        "It is twice what it should be: is the mean of a squared sine over a period taken as one, or half a cycle as a whole?",
+        "It is twice what it should be: is the mean of a squared sine over a period taken as one, "
+        "or half a cycle as a whole?",
         "(2 * D)",
         "D",
     ),
     (
         "half-a-cycle",
-        "It is pi times what it should be: is the characteristic taken along its tangent to half a cycle, or pi left out?",
+        "It is pi times what it should be: is the characteristic taken along its tangent to half "
+        "a cycle, or pi left out?",
         "2 * sp.pi",
         "2",
     ),
@@ -176,7 +195,8 @@ WRONG_TIMES = edits(
     ),
     (
         "variance-in-place",
-        "The argument of the Bessel function is upside down: the surer the loop, the longer it lasts.",
+        "The argument of the Bessel function is upside down: the surer the loop, the longer it "
+        "lasts.",
         "/ np.asarray",
         "* np.asarray",
     ),
@@ -194,7 +214,8 @@ WRONG_TIMES = edits(
     ),
     (
         "half-a-cycle",
-        "It is half of what it should be: is a loop half a cycle away taken as slipped? Every second one falls back from there.",
+        "It is half of what it should be: is a loop half a cycle away taken as slipped? Every "
+        "second one falls back from there.",
         "2 * np.pi**2",
         "np.pi**2",
     ),
@@ -212,7 +233,8 @@ WRONG_SLIPS = edits(
     ),
     (
         "rounded-to-zero",
-        "It is rounded towards zero: a loop that is a little short of a whole cycle rests there all the same.",
+        "It is rounded towards zero: a loop that is a little short of a whole cycle rests there "
+        "all the same.",
         "np.round",
         "np.trunc",
     ),
@@ -232,7 +254,8 @@ WRONG_SLIPS = edits(
     ("away-at-the-end", AT_THE_END, "slipped.sum()", "np.sum(cycles != 0)"),
     (
         "slipped-runs-only",
-        "Only the runs that slipped are averaged; those that lasted to the end are the good ones, and their steps count.",
+        "Only the runs that slipped are averaged; those that lasted to the end are the good ones, "
+        "and their steps count.",
         "first.sum() / slipped.sum()",
         "first[slipped].mean()",
     ),

@@ -1,6 +1,8 @@
-"""Questions of set r: a loop that tracks a phase, how large an offset it follows, and how long it lasts before it slips.
+"""Questions of set r: a loop that tracks a phase, how large an offset it follows, and how long it
+lasts before it slips.
 
-The set has a model of its own; hidden arguments are made here.  The keys are in keys.py, the known mistakes in mistakes.py.
+The set has a model of its own; hidden arguments are made here.  The keys are in keys.py, the known
+mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -29,14 +31,25 @@ NOISES, LOOP = sp.symbols("q r", positive=True), sp.symbols("p A D T", positive=
 
 
 def loop_numbers(exercise: Exercise) -> dict[str, float]:
-    """sigma of the meter (V, the amplitude is 1 V), s_phi by which the phase wanders (rad a step), rate of the samples (kHz)."""
-    return personal(exercise, "r", sigma=(2.0, 1.6, 2.4), s_phi=(0.2, 0.17, 0.24), rate=(8.0, 4, 12))
+    """sigma of the meter (V, the amplitude is 1 V), s_phi by which the phase wanders (rad a step),
+    rate of the samples (kHz)."""
+    return personal(
+        exercise, "r", sigma=(2.0, 1.6, 2.4), s_phi=(0.2, 0.17, 0.24), rate=(8.0, 4, 12)
+    )
 
 
 def samples(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("r1")
     phases = rng.uniform(-3, 3, (2, 20))
-    return [(phases[0], 2 * rng.normal(size=20), phases[1], rng.uniform(1.2, 1.8), rng.uniform(0.5, 0.8))]
+    return [
+        (
+            phases[0],
+            2 * rng.normal(size=20),
+            phases[1],
+            rng.uniform(1.2, 1.8),
+            rng.uniform(0.5, 0.8),
+        )
+    ]
 
 
 def variances(exercise: Exercise) -> list[tuple]:
@@ -45,14 +58,18 @@ def variances(exercise: Exercise) -> list[tuple]:
 
 
 def paths(exercise: Exercise) -> list[tuple]:
-    """Errors of loops that rest near whole cycles, and slip to either side: 60 steps, nine runs; six slip, one of them back."""
+    """Errors of loops that rest near whole cycles, and slip to either side: 60 steps, nine runs;
+    six slip, one of them back."""
     rng = exercise.rng("r6")
     error = 0.9 * np.sin(rng.normal(size=(60, 9)))
-    error[rng.integers(5, 20, 9), np.arange(9)] = 4.2 * rng.choice((-1, 1), 9)  # beyond the unstable zero, and back
+    # beyond the unstable zero, and back
+    error[rng.integers(5, 20, 9), np.arange(9)] = 4.2 * rng.choice((-1, 1), 9)
     for run, cycles in enumerate(rng.permutation([1, -1, 2, -1, 1])):
         error[rng.integers(22, 50) :, run] += 2 * np.pi * cycles
     error[30:40, 5] = 2 * np.pi + np.abs(error[30:40, 5])  # and is where it was, at the end
-    error[-1] = 2 * np.pi * np.round(error[-1] / (2 * np.pi)) + 0.4 * rng.permutation([1, -1, 1, -1, 1, -1, 1, -1, -1])
+    error[-1] = 2 * np.pi * np.round(error[-1] / (2 * np.pi)) + 0.4 * rng.permutation(
+        [1, -1, 1, -1, 1, -1, 1, -1, -1]
+    )
     return [(error,)]
 
 
@@ -75,7 +92,8 @@ QUESTIONS = (
         lambda e: [DELTA],
         WRONG_CHARACTERISTICS,
         ("U", "slope", "noise"),
-        advice="Put y in without its noise, and write products of sine and cosine as sums: which are left after a period?",
+        advice="Put y in without its noise, and write products of sine and cosine as sums: which "
+        "are left after a period?",
     ),
     Question(
         "r3",
@@ -85,7 +103,8 @@ QUESTIONS = (
         lambda e: [NOISES],
         WRONG_STEADY,
         ("Psi", "p"),
-        advice="Put your two results into both equations of the hint: do they hold? Try q = 1, r = 2.",
+        advice="Put your two results into both equations of the hint: do they hold? Try q = 1, r "
+        "= 2.",
     ),
     Question(
         "r4",
@@ -94,7 +113,8 @@ QUESTIONS = (
         keys.lock_in,
         lambda e: [LOOP],
         WRONG_RANGES,
-        advice="By how much can one correction move the phase at most? By how much does an offset move it between two samples?",
+        advice="By how much can one correction move the phase at most? By how much does an offset "
+        "move it between two samples?",
     ),
     Question(
         "r5",
@@ -103,7 +123,8 @@ QUESTIONS = (
         keys.mean_time,
         variances,
         WRONG_TIMES,
-        advice="Check a sure loop against the exponential formula of the chapter, and an unsure one against a free random walk.",
+        advice="Check a sure loop against the exponential formula of the chapter, and an unsure "
+        "one against a free random walk.",
     ),
     Question(
         "r6",
@@ -113,7 +134,8 @@ QUESTIONS = (
         paths,
         WRONG_SLIPS,
         ("cycles", "time"),
-        advice="Take two runs of ten steps by hand: one slips at step 4, the other never. How many steps were without a slip?",
+        advice="Take two runs of ten steps by hand: one slips at step 4, the other never. How "
+        "many steps were without a slip?",
     ),
 )
 

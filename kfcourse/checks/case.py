@@ -49,4 +49,7 @@ class Case:
     @property
     def formulas(self) -> list[tuple[list[sp.Expr], list[sp.Expr]]]:
         """Entries of both sides."""
-        return [(list(a), list(b)) if isinstance(b, sp.MatrixBase) else ([a], [b]) for a, b in self.pairs]
+        return [
+            (list(a), list(b)) if isinstance(b, sp.MatrixBase) else ([a], [b])
+            for a, b in self.pairs
+        ]

@@ -1,8 +1,10 @@
-"""A question whose answer is a derivation: a text, a step a line, each line checked against the one above it.
+"""A question whose answer is a derivation: a text, a step a line, each line checked against the one
+above it.
 
-The student's function takes nothing and returns the text.  `derivations.check_text` reads and compares it, and goes on after a
-slip from the student's own line; what is added here is whether the derivation begins where it should, shows its steps, and
-ends in the letters that are given.  There is no catalogue of mistakes: what is said follows from the lines.
+The student's function takes nothing and returns the text.  `derivations.check_text` reads and
+compares it, and goes on after a slip from the student's own line; what is added here is whether the
+derivation begins where it should, shows its steps, and ends in the letters that are given.  There
+is no catalogue of mistakes: what is said follows from the lines.
 """
 
 from __future__ import annotations
@@ -21,7 +23,16 @@ from kfcourse.derivations.setting import Setting, of_model, of_side
 from kfcourse.derivations.terms import MEAN, Node, letter, letters, walk, written
 from kfcourse.derivations.typed import read_line
 from kfcourse.derivations.values import Uncomputed
-from kfcourse.derivations.verdicts import AGAIN, BEGINS, DIFFERS, FOLLOWS, RIGHT, UNDECIDED, UNREADABLE, Derived
+from kfcourse.derivations.verdicts import (
+    AGAIN,
+    BEGINS,
+    DIFFERS,
+    FOLLOWS,
+    RIGHT,
+    UNDECIDED,
+    UNREADABLE,
+    Derived,
+)
 from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.model import Model
 
@@ -31,8 +42,10 @@ if TYPE_CHECKING:
 MOST_LINES = 60
 LONGEST = 20_000  # characters
 SHOWN = 70  # of a line that is quoted
-COUNTED = 4  # right steps that earn credit beside a slip: a step can be split up at will, and that earns no more
-HEADINGS = ("letters", "positive")  # that may stand in an answer; the others would change what is asked
+# right steps that earn credit beside a slip: a step can be split up at will, and that earns no more
+COUNTED = 4
+# that may stand in an answer; the others would change what is asked
+HEADINGS = ("letters", "positive")
 
 
 @dataclass(frozen=True)
@@ -66,19 +79,25 @@ class Posed:
 
     @property
     def law(self) -> str:
-        """That of the state, typeset, with its letters; of several components the letters in words."""
+        """That of the state, typeset, with its letters; of several components the letters in
+        words."""
         law = of_side(self.setting, self.name).law
         if len(law.states) == 1:
             return rf"$x\sim\mathcal N({law.means[0]},{law.cov[0][0]})$"
         entries = dict.fromkeys(entry for row in law.cov for entry in row)
-        states, means, covs = (", ".join(f"`{one}`" for one in names) for names in (law.states, law.means, entries))
+        states, means, covs = (
+            ", ".join(f"`{one}`" for one in names) for names in (law.states, law.means, entries)
+        )
         return f"the normal law of {states}, with the means {means} and the covariances {covs},"
 
 
 def posed_by(model: Model, name: str) -> Posed:
-    """The derivation of a structural function of a model; ModelError if derivations are not checked for it."""
+    """The derivation of a structural function of a model; ModelError if derivations are not checked
+    for it."""
     setting = of_model(model)
-    return Posed(setting, name, frozenset(model.parameters) | set(of_side(setting, name).law.letters))
+    return Posed(
+        setting, name, frozenset(model.parameters) | set(of_side(setting, name).law.letters)
+    )
 
 
 class Judged(NamedTuple):
@@ -112,7 +131,9 @@ class Derivation(Question):
         """
         posed = self.posed(exercise)
         report, chain = _read(posed, text)
-        slip = next((one for one in report.verdicts if one.status in (DIFFERS, UNREADABLE, UNDECIDED)), None)
+        slip = next(
+            (one for one in report.verdicts if one.status in (DIFFERS, UNREADABLE, UNDECIDED)), None
+        )
         right, steps = _counted(report, posed.name)
         tree = _last(chain)
         if not right and slip is not None and slip.status != DIFFERS:
@@ -121,12 +142,19 @@ class Derivation(Question):
         earned, wrong = min(right, COUNTED), steps - right
         share = earned / (earned + max(wrong, 1)) * (0.5 if open_end else 1.0)
         if slip is not None:
-            return Judged(WRONG, _says(report, slip, right, steps), slip.kinds or (slip.status,), share)
+            return Judged(
+                WRONG, _says(report, slip, right, steps), slip.kinds or (slip.status,), share
+            )
         if open_end:
-            so_far = f"right so far, {steps} of {steps} steps. " if steps else "nothing is derived yet. "
+            so_far = (
+                f"right so far, {steps} of {steps} steps. " if steps else "nothing is derived yet. "
+            )
             return Judged(WRONG, so_far + open_end, ("open-end",), share)
         if tree is None or not _is(posed, tree):
-            says = f"each line follows from the one above it, but the end is not {posed.name}: a name was given another meaning."
+            says = (
+                f"each line follows from the one above it, but the end is not {posed.name}: a "
+                f"name was given another meaning."
+            )
             return Judged(WRONG, says, ("other-meaning",), 0.0)
         if shown := _not_shown(posed, chain):
             return Judged(WRONG, f"the end is right. {shown}", ("steps-missing",), 1 / posed.fewest)
@@ -141,11 +169,16 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
         raise Unusable(f"the derivation is empty; {begin}")
     lines = text.splitlines()
     if len(text) > LONGEST or len(lines) > MOST_LINES:
-        raise Unusable(f"got {len(lines)} lines of {len(text)} characters; at most {MOST_LINES} lines and {LONGEST} are read")
+        raise Unusable(
+            f"got {len(lines)} lines of {len(text)} characters; at most {MOST_LINES} lines and "
+            f"{LONGEST} are read"
+        )
     for number, line in enumerate(lines, 1):
         typed = line.partition("#")[0].strip()
         if typed and "=" not in typed and typed.split()[0] not in HEADINGS:
-            raise Unusable(f"line {number}, `{_short(typed)}`, has no `=`; {begin}. A remark stands after #")
+            raise Unusable(
+                f"line {number}, `{_short(typed)}`, has no `=`; {begin}. A remark stands after #"
+            )
     try:
         report = check_text(text, None, posed.setting)
     except DerivationError as error:
@@ -153,10 +186,16 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
     law = posed.setting.law
     for one in report.chains:
         if one.name in {*law.random, *law.letters, *posed.ends}:
-            raise Unusable(f"a chain begins with `{one.name} =`, which has a meaning already; derive `{posed.name}`")
+            raise Unusable(
+                f"a chain begins with `{one.name} =`, which has a meaning already; derive "
+                f"`{posed.name}`"
+            )
     chains = [one for one in report.chains if one.name == posed.name]
     if len(chains) != 1:
-        raise Unusable(f"{len(chains) or 'no'} chain{'s' * (len(chains) != 1)} with `{posed.name}` at the left; {begin}")
+        raise Unusable(
+            f"{len(chains) or 'no'} chain{'s' * (len(chains) != 1)} with `{posed.name}` at the "
+            f"left; {begin}"
+        )
     return report, chains[0]
 
 
@@ -172,13 +211,18 @@ def _last(chain: Derived) -> Node | None:
 
 
 def _counted(report: Report, name: str) -> tuple[int, int]:
-    """Right steps, and all; a line that repeats the one above it is no step, nor is one that still has the name in it."""
+    """Right steps, and all; a line that repeats the one above it is no step, nor is one that still
+    has the name in it."""
     right = steps = 0
     for chain in report.chains:
         above = ""
         for one in chain.verdicts:
             same, above = one.text == above, one.text
-            if one.status == BEGINS or same or ((tree := _tree(one.text)) is not None and name in letters(tree)):
+            if (
+                one.status == BEGINS
+                or same
+                or ((tree := _tree(one.text)) is not None and name in letters(tree))
+            ):
                 continue
             steps += 1
             right += one.status in (RIGHT, FOLLOWS, AGAIN)
@@ -193,7 +237,10 @@ def _open(posed: Posed, tree: Node | None) -> str:
         return "In the last line a mean is still to be taken: go on until none is left."
     left = sorted(letters(tree) - posed.ends)
     if left:
-        return f"The last line still has {', '.join(left)} in it: go on until only given letters are left."
+        return (
+            f"The last line still has {', '.join(left)} in it: go on until only given letters "
+            f"are left."
+        )
     return ""
 
 
@@ -210,7 +257,9 @@ def _not_shown(posed: Posed, chain: Derived) -> str:
     if posed.averages and not any(one.kind == MEAN for tree in trees for _, one in walk(tree)):
         return "But a derivation is asked for: begin with a mean M[...], and take a step a line."
     if len({written(tree) for tree in trees}) < posed.fewest:
-        return f"But too much is done at once: a step a line, {posed.fewest} different lines at least."
+        return (
+            f"But too much is done at once: a step a line, {posed.fewest} different lines at least."
+        )
     return ""
 
 
@@ -235,5 +284,9 @@ def _says(report: Report, slip: Verdict, right: int, steps: int) -> str:
     again = [f"line {one.line}" for one in later if one.status == DIFFERS]
     more = f" There is a slip of its own in {', '.join(again)} too." if again else ""
     on_top = sum(one.status == FOLLOWS for one in later)
-    kept = f" What follows is right on top of it ({on_top} step{'s' * (on_top != 1)})." if on_top else ""
+    kept = (
+        f" What follows is right on top of it ({on_top} step{'s' * (on_top != 1)})."
+        if on_top
+        else ""
+    )
     return f"{_place(slip)}: {_words(slip)}{kept}{more} {right} of {steps} steps are right."

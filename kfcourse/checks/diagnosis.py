@@ -1,4 +1,5 @@
-"""What kind of mistake does a wrong answer look like?  A known one of all of its results, or of one; or what a hint says."""
+"""What kind of mistake does a wrong answer look like?  A known one of all of its results, or of
+one; or what a hint says."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from kfcourse.checks.question import Answer, Mistake, Question
 
 MANY = 3  # numbers that are no coincidence
 GENERAL = (
-    "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
+    "It does not look like one of the usual mistakes. Check each step of the derivation, "
+    "and try a case whose answer you know."
 )
 
 
@@ -32,7 +34,8 @@ class Wrong:
     arguments: Sequence[tuple]
     found: list[Any]
     expected: list[Any]
-    known: Sequence[tuple[Mistake, list[Any] | None]]  # mistakes with their results, None where impossible
+    # mistakes with their results, None where impossible
+    known: Sequence[tuple[Mistake, list[Any] | None]]
     agree: Agree
 
     @property
@@ -40,11 +43,20 @@ class Wrong:
         return self.question.parts
 
     def told(self) -> tuple[str, list[str], bool]:
-        """What to say, the names of the mistakes it looks like, and whether that explains the first result that is wrong."""
+        """What to say, the names of the mistakes it looks like, and whether that explains the first
+        result that is wrong."""
         parts = self.parts
         right = [place for place, good in enumerate(self._right) if good]
-        start = f"{', '.join(parts[place] for place in right)} right, the rest not. " if right else "not right. "
-        whole = [mistake for mistake, wrong in self.known if wrong is not None and self.agree(self.found, wrong)]
+        start = (
+            f"{', '.join(parts[place] for place in right)} right, the rest not. "
+            if right
+            else "not right. "
+        )
+        whole = [
+            mistake
+            for mistake, wrong in self.known
+            if wrong is not None and self.agree(self.found, wrong)
+        ]
         if whole:
             return start + _said(whole), _named(whole), True
         if not parts:
@@ -52,20 +64,30 @@ class Wrong:
             return start + (hint or GENERAL), seen, _tells(seen)
         if self._swapped():
             return "not right. All results are right, but in another order.", ["swapped"], True
-        found = [(parts[place], *self._diagnosis(place)) for place in range(len(parts)) if place not in right]
+        found = [
+            (parts[place], *self._diagnosis(place))
+            for place in range(len(parts))
+            if place not in right
+        ]
         names = list(dict.fromkeys(name for _, seen, _ in found for name in seen))
         hints: dict[str, list[str]] = {}
         for part, seen, hint in found:
-            if self._known(seen) and not set(seen) & set(found[0][1]):  # its formula may be right, on a wrong result
+            # its formula may be right, on a wrong result
+            if self._known(seen) and not set(seen) & set(found[0][1]):
                 hint += f" Or: it follows from {found[0][0]}."
             hints.setdefault(hint, []).append(part)
         first, unknown = found[0], hints.pop("", [])
         told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
-        start_there = first[0] in unknown and not self._known(names)  # what there are hints of may follow from it
+        # what there are hints of may follow from it
+        start_there = first[0] in unknown and not self._known(names)
         if unknown and not told:
             told = [GENERAL]
         elif start_there:
-            told.insert(0, f"{', '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} wrong too: start there.")
+            told.insert(
+                0,
+                f"{', '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} wrong too: start "
+                f"there.",
+            )
         elif unknown:
             told.append(f"{', '.join(unknown)} may be wrong for the same reason.")
         return start + " ".join(told), names, _tells(names) and not start_there
@@ -77,13 +99,20 @@ class Wrong:
         return self.agree(part_of(self.found, place), part_of(wanted, place))
 
     def _swapped(self) -> bool:
-        orders = [order for order in permutations(range(len(self.parts))) if list(order) != sorted(order)]
+        orders = [
+            order for order in permutations(range(len(self.parts))) if list(order) != sorted(order)
+        ]
         return any(
-            all(self.agree(part_of(self.found, i), part_of(self.expected, j)) for i, j in enumerate(order)) for order in orders
+            all(
+                self.agree(part_of(self.found, i), part_of(self.expected, j))
+                for i, j in enumerate(order)
+            )
+            for order in orders
         )
 
     def _diagnosis(self, place: int | None) -> tuple[list[str], str]:
-        """Names of the mistakes that one result looks like, and what to say: nothing if it looks like none."""
+        """Names of the mistakes that one result looks like, and what to say: nothing if it looks
+        like none."""
 
         def of(results: Sequence[Any]) -> Sequence[Any]:
             return results if place is None else part_of(results, place)
@@ -99,27 +128,50 @@ class Wrong:
                 (mistake, wrong)
                 for mistake, wrong in possible
                 if self.agree(mine[first], of(wrong)[first])
-                and all(self.agree([a], [b]) for a, b, right in zip(of(wrong), theirs, good, strict=True) if right)
+                and all(
+                    self.agree([a], [b])
+                    for a, b, right in zip(of(wrong), theirs, good, strict=True)
+                    if right
+                )
             ]
         if seen:
             likely = self._likely(seen)
             return _named(likely), _said(likely)
-        apart = [[not self.agree([a], [b]) for a, b in zip(of(wrong), theirs, strict=True)] for _, wrong in possible]
+        apart = [
+            [not self.agree([a], [b]) for a, b in zip(of(wrong), theirs, strict=True)]
+            for _, wrong in possible
+        ]
         apart = [row for row in apart if any(row)]
-        telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
-        others = [(name, part_of(self.expected, i)) for i, name in enumerate(self.parts) if i != place]
+        telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [
+            True
+        ] * len(theirs)
+        others = [
+            (name, part_of(self.expected, i)) for i, name in enumerate(self.parts) if i != place
+        ]
         said = general(
             Case(
-                *(mine, theirs, self.agree, self.arguments, self.names, place or 0, others, telling),
+                *(
+                    mine,
+                    theirs,
+                    self.agree,
+                    self.arguments,
+                    self.names,
+                    place or 0,
+                    others,
+                    telling,
+                ),
                 *(self.sensitivity, self.question.axes),
             )
         )
         return ([said[0]], said[1]) if said else ([], "")
 
     def _likely(self, seen: Sequence[tuple[Mistake, list[Any]]]) -> list[Mistake]:
-        """Those that spoil the fewest results that are right; of these, those that explain the most of the wrong ones."""
+        """Those that spoil the fewest results that are right; of these, those that explain the most
+        of the wrong ones."""
         ranks = [self._rank(wrong) for _, wrong in seen]
-        return [mistake for (mistake, _), rank in zip(seen, ranks, strict=True) if rank == max(ranks)]
+        return [
+            mistake for (mistake, _), rank in zip(seen, ranks, strict=True) if rank == max(ranks)
+        ]
 
     def _rank(self, wrong: Sequence[Any]) -> tuple[int, int]:
         fits = [self._agrees(place, wrong) for place in range(len(self.parts))]
@@ -139,9 +191,12 @@ class Wrong:
     def sensitivity(self) -> Sensitivity:
         """To the arguments of the calls."""
         results = [
-            tuple(list(one) if self.parts else [one] for one in pair) for pair in zip(self.expected, self.found, strict=True)
+            tuple(list(one) if self.parts else [one] for one in pair)
+            for pair in zip(self.expected, self.found, strict=True)
         ]
-        return Sensitivity(self.names, self.answers, self.arguments, results, bool(self.parts), self.question.spare)
+        return Sensitivity(
+            self.names, self.answers, self.arguments, results, bool(self.parts), self.question.spare
+        )
 
     def case(self, values: Mapping[sp.Symbol, Any]) -> str:
         """One input for which the answer is wrong, and what it gives there."""
@@ -149,11 +204,17 @@ class Wrong:
         size = [sum(np.size(value) for value in one) for one in self.arguments]
         which = min((i for i, good in enumerate(right) if not good), key=size.__getitem__)
         mine, theirs = self.found[which], self.expected[which]
-        parts = [place for place in range(len(self.parts)) if not self.agree([mine[place]], [theirs[place]])]
+        parts = [
+            place
+            for place in range(len(self.parts))
+            if not self.agree([mine[place]], [theirs[place]])
+        ]
         place = parts[0] if parts else None
         mine, theirs = (one if place is None else one[place] for one in (mine, theirs))
         what = "" if place is None else self.parts[place]
-        return shown(self.names, self.arguments[which], mine, theirs, what, self.question.axes, values)
+        return shown(
+            self.names, self.arguments[which], mine, theirs, what, self.question.axes, values
+        )
 
 
 def _said(mistakes: Sequence[Mistake]) -> str:

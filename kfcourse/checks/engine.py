@@ -1,8 +1,9 @@
 """Self-checks: is an answer right, and if not, what kind of mistake does it look like?
 
-A `Question` holds the right answer and a catalogue of mistakes, wrong answers that students give, each with what to say of it.
-The student's function and they are called with the same hidden arguments; an answer that equals a mistake is recognised by name.
-Nothing that a student hands in may crash a check, and no message contains the answer.
+A `Question` holds the right answer and a catalogue of mistakes, wrong answers that students give,
+each with what to say of it. The student's function and they are called with the same hidden
+arguments; an answer that equals a mistake is recognised by name. Nothing that a student hands in
+may crash a check, and no message contains the answer.
 """
 
 from __future__ import annotations
@@ -52,7 +53,9 @@ class Missing(Exception):
     """The student has not written this answer yet."""
 
 
-def call(answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], seconds: float) -> list[Any]:
+def call(
+    answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], seconds: float
+) -> list[Any]:
     """The answer's results for every tuple of arguments, in the form of the expected ones.
 
     Raises
@@ -63,15 +66,21 @@ def call(answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], secon
         It is not callable, fails, takes too long, or returns something of another form.
     """
     if not callable(answer):
-        raise Unusable(f"expected a function, got {type(answer).__name__}; pass the function itself, without calling it")
+        raise Unusable(
+            f"expected a function, got {type(answer).__name__}; pass the function itself, without "
+            f"calling it"
+        )
     results = []
     try:
         with time_limit(seconds), np.errstate(all="ignore"):
             for values, wanted in zip(arguments, expected, strict=True):
                 results.append(_formed(answer(*copy.deepcopy(values)), wanted))
     except OutOfTime as late:
-        took = late.args[0] if late.args else seconds  # an answer in another process may have a limit of its own
-        raise Unusable(f"still running after {took:g} s: is there a loop that never ends?") from None
+        # an answer in another process may have a limit of its own
+        took = late.args[0] if late.args else seconds
+        raise Unusable(
+            f"still running after {took:g} s: is there a loop that never ends?"
+        ) from None
     except (Missing, Unusable, KeyboardInterrupt):  # whoever stops the kernel means the check too
         raise
     except RecursionError:
@@ -88,7 +97,11 @@ def _formed(result: Any, wanted: Any) -> Any:
     try:
         return like(result, wanted)
     except Unusable as reason:
-        if not isinstance(wanted, tuple) or not isinstance(result, tuple | list) or len(result) != len(wanted):
+        if (
+            not isinstance(wanted, tuple)
+            or not isinstance(result, tuple | list)
+            or len(result) != len(wanted)
+        ):
             raise
         if any(_fits(order, wanted) for order in permutations(result)):
             raise Unusable(f"{reason}: are the results in another order?") from None
@@ -110,7 +123,9 @@ def _frames(error: BaseException) -> list[traceback.FrameSummary]:
 def _foreign(frame: traceback.FrameSummary) -> bool:
     """Whether the line is of a library or of this package, not of a student."""
     own = Path(frame.filename)
-    return "site-packages" in frame.filename or any(own.is_relative_to(folder) for folder in (PACKAGE, *folders()))
+    return "site-packages" in frame.filename or any(
+        own.is_relative_to(folder) for folder in (PACKAGE, *folders())
+    )
 
 
 def in_library(error: BaseException) -> bool:
@@ -136,8 +151,15 @@ def told(error: BaseException) -> str:
     return f"{type(error).__name__}{': ' * bool(text)}{text}{where}"
 
 
-def check(question: Question, exercise: Exercise, answer: Any, seconds: float = SECONDS, past: Attempts | None = None) -> Result:
-    """Check an answer to a question; never raises, whatever the answer is, and whatever fails in the check itself.
+def check(
+    question: Question,
+    exercise: Exercise,
+    answer: Any,
+    seconds: float = SECONDS,
+    past: Attempts | None = None,
+) -> Result:
+    """Check an answer to a question; never raises, whatever the answer is, and whatever fails in
+    the check itself.
 
     `past` is what was handed in before, of the same notebook; the answer is added to it.
     """
@@ -146,7 +168,10 @@ def check(question: Question, exercise: Exercise, answer: Any, seconds: float = 
     try:
         result = _Check(posed(question, exercise), answer, seconds, past).result()
     except Exception as error:
-        says = "The check itself failed, and that is not your fault. It counts for nothing; please tell your teacher."
+        says = (
+            "The check itself failed, and that is not your fault. It counts for nothing; "
+            "please tell your teacher."
+        )
         return Result(question.name, question.title, NOT_CHECKED, says, trouble=_trouble(error))
     if result.status == WRONG:
         past.wrong[question.name] = answer
@@ -155,12 +180,15 @@ def check(question: Question, exercise: Exercise, answer: Any, seconds: float = 
 
 def _trouble(error: Exception) -> str:
     """Kind and place of an error of ours, for the teacher."""
-    frames = [f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in _frames(error)]
+    frames = [
+        f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in _frames(error)
+    ]
     return f"{told(error)} ({' < '.join(reversed(frames[-4:]))})"
 
 
 def posed(question: Question, exercise: Exercise) -> Posed:
-    """The question as it is posed in an exercise, which keeps it: answers are compared with the same again and again."""
+    """The question as it is posed in an exercise, which keeps it: answers are compared with the
+    same again and again."""
     return exercise.posed.setdefault(question, Posed(question, exercise))
 
 
@@ -188,17 +216,31 @@ class Posed:
     @cached_property
     def known(self) -> list[tuple[Mistake, list[Any] | None]]:
         """Mistakes with their results, None where impossible."""
-        return [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
+        return [
+            (mistake, _wrong(mistake, self.exercise, self.arguments, self.expected))
+            for mistake in self.question.mistakes
+        ]
 
     @cached_property
     def values(self) -> dict[sp.Symbol, Any]:
         """Of the parameters: of the model's symbols that are no arguments of the answer."""
-        given = {s.name for values in self.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
+        given = {
+            s.name
+            for values in self.arguments
+            for v in values
+            if hasattr(v, "free_symbols")
+            for s in v.free_symbols
+        }
         return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
 
     @cached_property
     def agree(self) -> Agree:
-        return partial(_agree, values=self.values, tolerance=self.question.tolerance, places=self.exercise.places)
+        return partial(
+            _agree,
+            values=self.values,
+            tolerance=self.question.tolerance,
+            places=self.exercise.places,
+        )
 
 
 @dataclass(frozen=True)
@@ -232,17 +274,22 @@ class _Check:
             return self._derived(self.question, found)
         try:
             with time_limit(self.seconds):
-                if self.posed.agree(found, self.posed.expected) and not self._in_numbers(found, self.posed.expected):
+                if self.posed.agree(found, self.posed.expected) and not self._in_numbers(
+                    found, self.posed.expected
+                ):
                     self.past.given.pop(self.question.name, None)
                     return self._says(PASSED, "right", share=1.0)
         except OutOfTime:
-            return self._says(UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it")
+            return self._says(
+                UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it"
+            )
         try:
             with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
                 return self._wrong(found)
         except OutOfTime:
             return self._says(WRONG, f"not right. {GENERAL}")
-        except Exception as error:  # of ours: the answer is wrong all the same, only the hint is lost
+        # of ours: the answer is wrong all the same, only the hint is lost
+        except Exception as error:
             return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
 
     def _derived(self, question: Derivation, found: list[str]) -> Result:
@@ -252,7 +299,9 @@ class _Check:
         except Unusable as reason:
             return self._says(UNUSABLE, str(reason))
         except OutOfTime:
-            return self._says(UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps")
+            return self._says(
+                UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
+            )
         message = judged.message
         if judged.status == PASSED:
             self.past.given.pop(question.name, None)
@@ -269,7 +318,8 @@ class _Check:
         )
 
     def _numbers(self, found: list[Any]) -> bool:
-        """Whether the formulas are right where parameters have their values, and those that are wrong as they are lack some."""
+        """Whether the formulas are right where parameters have their values, and those that are
+        wrong as they are lack some."""
         wrong = [
             pair
             for pair in zip(_flat(found), _flat(self.posed.expected), strict=True)
@@ -277,30 +327,47 @@ class _Check:
         ]
         if not all(self._in_numbers(mine, right) for mine, right in wrong):
             return False
-        sides = ([with_values(one, self.posed.values) for one in _flat(side)] for side in (found, self.posed.expected))
+        sides = (
+            [with_values(one, self.posed.values) for one in _flat(side)]
+            for side in (found, self.posed.expected)
+        )
         return bool(_flat(self.posed.expected)) and self.posed.agree(*sides)
 
     def _wrong(self, found: list[Any]) -> Result:
-        pairs = [(part_of(found, place), part_of(self.posed.expected, place)) for place in range(len(self.question.parts))]
-        right = [1 for mine, theirs in pairs if self.posed.agree(mine, theirs) and not self._in_numbers(mine, theirs)]
+        pairs = [
+            (part_of(found, place), part_of(self.posed.expected, place))
+            for place in range(len(self.question.parts))
+        ]
+        right = [
+            1
+            for mine, theirs in pairs
+            if self.posed.agree(mine, theirs) and not self._in_numbers(mine, theirs)
+        ]
         share = len(right) / len(self.question.parts) if right else 0.0
         times = self._times(found)
         follows = self._follows(found)
         if follows:
-            says = f"this step is right on top of your {' and '.join(follows)}; what is not right yet is there: look there first."
+            says = (
+                f"this step is right on top of your {' and '.join(follows)}; what is not right "
+                f"yet is there: look there first."
+            )
             return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
         if self._numbers(found):
             return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
         posed = self.posed
         answers = posed.key, self.answer
-        wrong = Wrong(self.question, answers, posed.arguments, found, posed.expected, posed.known, posed.agree)
+        wrong = Wrong(
+            self.question, answers, posed.arguments, found, posed.expected, posed.known, posed.agree
+        )
         message, names, explained = wrong.told()
         more = [] if explained else [wrong.case(self.posed.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
         if times > (1 if self.question.advice else 0) and explained:
             more.append(wrong.case(self.posed.values))
-        return self._says(WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share)
+        return self._says(
+            WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share
+        )
 
     def _times(self, found: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""
@@ -315,7 +382,11 @@ class _Check:
         own_step = key.step if isinstance(key, ForVariant) else key
         if own_step is None:
             return ()
-        earlier = {one.function: one for one in self.exercise.questions.values() if one.name in self.past.wrong}
+        earlier = {
+            one.function: one
+            for one in self.exercise.questions.values()
+            if one.name in self.past.wrong
+        }
         own = [function for function in earlier if function in uses(own_step)]
         for chosen in ([own] if len(own) > 1 else []) + [[one] for one in own]:
             try:
@@ -324,7 +395,9 @@ class _Check:
                 with time_limit(self.seconds):
                     theirs = [
                         like(step(*copy.deepcopy(values)), wanted)
-                        for values, wanted in zip(self.posed.arguments, self.posed.expected, strict=True)
+                        for values, wanted in zip(
+                            self.posed.arguments, self.posed.expected, strict=True
+                        )
                     ]
                     if self.posed.agree(found, theirs):
                         return tuple(earlier[one].name for one in chosen)
@@ -333,9 +406,12 @@ class _Check:
         return ()
 
     def _in_form(self, question: Question) -> Answer:
-        """A wrong answer to an earlier question with results in the form of the key's, as our own functions take them."""
+        """A wrong answer to an earlier question with results in the form of the key's, as our own
+        functions take them."""
         key, wrong = question.answer(self.exercise), self.past.wrong[question.name]
-        return lambda *values: like(wrong(*copy.deepcopy(values)), standard(key(*copy.deepcopy(values))))
+        return lambda *values: like(
+            wrong(*copy.deepcopy(values)), standard(key(*copy.deepcopy(values)))
+        )
 
 
 def _flat(result: Any) -> list[sp.Expr]:
@@ -351,25 +427,43 @@ def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
 
 
 def standard(value: Any) -> Any:
-    """A result in the form in which results are compared: formulas, arrays of floats, texts, and tuples of them."""
+    """A result in the form in which results are compared: formulas, arrays of floats, texts, and
+    tuples of them."""
     if isinstance(value, tuple | list):
         return tuple(standard(part) for part in value)
-    return value if isinstance(value, sp.Basic | sp.MatrixBase | str) else np.asarray(value, dtype=float)
+    return (
+        value
+        if isinstance(value, sp.Basic | sp.MatrixBase | str)
+        else np.asarray(value, dtype=float)
+    )
 
 
 def _agree(
-    found: Sequence[Any], expected: Sequence[Any], values: Mapping[sp.Symbol, Any], tolerance: float, places: Places = ()
+    found: Sequence[Any],
+    expected: Sequence[Any],
+    values: Mapping[sp.Symbol, Any],
+    tolerance: float,
+    places: Places = (),
 ) -> bool:
     return all(equal(a, b, tolerance, values, places) for a, b in zip(found, expected, strict=True))
 
 
-def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], expected: Sequence[Any]) -> list[Any] | None:
+def _wrong(
+    mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], expected: Sequence[Any]
+) -> list[Any] | None:
     """Results of a known wrong answer; None if this variant does not allow the mistake."""
     try:
         wrong = mistake.answer(exercise)
-        return [like(wrong(*copy.deepcopy(values)), wanted) for values, wanted in zip(arguments, expected, strict=True)]
-    except Exception:  # of shapes, mostly; a test makes sure that each mistake is known where it is possible
+        return [
+            like(wrong(*copy.deepcopy(values)), wanted)
+            for values, wanted in zip(arguments, expected, strict=True)
+        ]
+    # of shapes, mostly; a test makes sure that each mistake is known where it is possible
+    except Exception:
         return None
 
 
-NUMBERS = "Right in numbers, but the parameters are asked for as symbols: type their letters where their values stand."
+NUMBERS = (
+    "Right in numbers, but the parameters are asked for as symbols: type their letters "
+    "where their values stand."
+)

@@ -1,7 +1,8 @@
 """Is an answer the right one?  Comparison of formulas by value and of numbers to rounding.
 
-A formula counts as equal if it takes the same values, to 30 digits, at several random points of both signs: any equivalent form
-passes, and no simplification has to succeed.  Where it has floats, as 2*np.pi or (1/3)*x, to their digits.
+A formula counts as equal if it takes the same values, to 30 digits, at several random points of
+both signs: any equivalent form passes, and no simplification has to succeed.  Where it has floats,
+as 2*np.pi or (1/3)*x, to their digits.
 """
 
 from __future__ import annotations
@@ -18,10 +19,14 @@ import sympy as sp
 from kfcourse.symbolic.formula import symbol
 
 DIGITS = 60  # of the values of formulas
-AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
-FLOAT_DIGITS = 10, 15  # of a decimal: as many are not typed but computed; 1/3 and 2*np.pi have some 15 in Python
-DOUBLE_BITS = 1100  # of numerator and denominator at most: 2**1024 and 10**324 are the ends of double precision
-FLOATS_AGREE = sp.Float(10) ** -12  # of formulas with such numbers: 15 digits, of which terms that cancel may take three
+# relative difference of equal formulas: half of the digits may be lost by cancellation
+AGREE = sp.Float(10) ** -30
+# of a decimal: as many are not typed but computed; 1/3 and 2*np.pi have some 15 in Python
+FLOAT_DIGITS = 10, 15
+# of numerator and denominator at most: 2**1024 and 10**324 are the ends of double precision
+DOUBLE_BITS = 1100
+# of formulas with such numbers: 15 digits, of which terms that cancel may take three
+FLOATS_AGREE = sp.Float(10) ** -12
 POINTS = 6
 ROUNDED = 1e-9  # relative size of an imaginary part that rounding explains
 
@@ -43,11 +48,14 @@ def like(answer: Any, expected: Any) -> Any:
     """
     if isinstance(expected, tuple):
         if isinstance(answer, np.ndarray | sp.MatrixBase) and np.size(answer) == len(expected):
-            answer = [entry for entry in np.ravel(np.asarray(answer))]  # an array, or a column, of numbers or formulas
+            # an array, or a column, of numbers or formulas
+            answer = [entry for entry in np.ravel(np.asarray(answer))]
         elif isinstance(answer, np.ndarray) and answer.ndim and len(answer) == len(expected):
             answer = list(answer)
         if not isinstance(answer, tuple | list) or len(answer) != len(expected):
-            raise Unusable(f"expected {len(expected)} results, `return a, b, ...`, got {describe(answer)}")
+            raise Unusable(
+                f"expected {len(expected)} results, `return a, b, ...`, got {describe(answer)}"
+            )
         parts = []
         for place, (one, wanted) in enumerate(zip(answer, expected, strict=True), 1):
             try:
@@ -57,7 +65,9 @@ def like(answer: Any, expected: Any) -> Any:
         return tuple(parts)
     if isinstance(expected, str):
         if not isinstance(answer, str):
-            raise Unusable(f"expected a text, in three quotes if it has several lines, got {describe(answer)}")
+            raise Unusable(
+                f"expected a text, in three quotes if it has several lines, got {describe(answer)}"
+            )
         return str(answer)
     if isinstance(expected, sp.MatrixBase):
         return _formulas(answer, expected)
@@ -67,30 +77,39 @@ def like(answer: Any, expected: Any) -> Any:
 
 
 def _formula(answer: Any) -> sp.Expr:
-    if isinstance(answer, sp.MatrixBase | np.ndarray | list | tuple) and np.size(answer) == 1:  # in brackets of any kind
+    # in brackets of any kind
+    if isinstance(answer, sp.MatrixBase | np.ndarray | list | tuple) and np.size(answer) == 1:
         answer = np.ravel(np.array(answer, dtype=object))[0]
     if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
         raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
-    formula = sp.nsimplify(answer, rational=True) if isinstance(answer, float | np.floating) else sp.sympify(answer)
+    formula = (
+        sp.nsimplify(answer, rational=True)
+        if isinstance(answer, float | np.floating)
+        else sp.sympify(answer)
+    )
     if formula.has(sp.Derivative, sp.Integral):
         formula = formula.doit()
     if formula.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
         raise Unusable("the formula is not finite: it contains NaN or infinity")
-    return formula.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))  # 0.9 typed for 9/10 is no mistake
+    # 0.9 typed for 9/10 is no mistake
+    return formula.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))
 
 
 def _formulas(answer: Any, expected: sp.MatrixBase) -> sp.ImmutableMatrix:
     try:
         matrix = answer if isinstance(answer, sp.MatrixBase) else sp.Matrix(answer)
-        if not isinstance(answer, sp.MatrixBase) and np.ndim(answer) == 1 and expected.rows == 1:  # a list is a row as well
+        # a list is a row as well
+        if not isinstance(answer, sp.MatrixBase) and np.ndim(answer) == 1 and expected.rows == 1:
             matrix = matrix.T
     except (TypeError, ValueError, AttributeError):
         raise Unusable(
-            f"expected a matrix of formulas with {expected.rows} rows and {expected.cols} columns, got {describe(answer)}"
+            f"expected a matrix of formulas with {expected.rows} rows and {expected.cols} "
+            f"columns, got {describe(answer)}"
         ) from None
     if matrix.shape != expected.shape:
         raise Unusable(
-            f"expected a matrix with {expected.rows} rows and {expected.cols} columns, got {matrix.rows} x {matrix.cols}"
+            f"expected a matrix with {expected.rows} rows and {expected.cols} columns, got "
+            f"{matrix.rows} x {matrix.cols}"
         )
     return sp.ImmutableMatrix(matrix.rows, matrix.cols, [_formula(entry) for entry in matrix])
 
@@ -106,7 +125,8 @@ def _array(answer: Any, expected: np.ndarray) -> np.ndarray:
             if np.abs(array.imag).max(initial=0.0) > ROUNDED * np.abs(array).max(initial=0.0):
                 raise Unusable("got complex numbers: was a root taken of something negative?")
             array = array.real
-        if isinstance(answer, np.matrix) and expected.ndim < 2 and array.size == expected.size:  # it always has two axes
+        # it always has two axes
+        if isinstance(answer, np.matrix) and expected.ndim < 2 and array.size == expected.size:
             array = array.reshape(expected.shape)
         if array.dtype.kind not in "biufO":
             raise TypeError
@@ -116,7 +136,10 @@ def _array(answer: Any, expected: np.ndarray) -> np.ndarray:
     if array.shape != expected.shape:
         raise Unusable(f"expected {_wanted(expected)}, got the shape {array.shape}")
     if not np.isfinite(array[np.isfinite(expected)]).all():
-        raise Unusable("the result contains NaN or infinity: was something divided by zero, or a missing measurement used?")
+        raise Unusable(
+            "the result contains NaN or infinity: was something divided by zero, or a missing "
+            "measurement used?"
+        )
     return array
 
 
@@ -135,18 +158,25 @@ def describe(value: Any) -> str:
     return f"{type(value).__name__}"
 
 
-def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, Any], places: Places = ()) -> bool:
+def equal(
+    first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, Any], places: Places = ()
+) -> bool:
     """Whether two answers of the same form are equal.
 
-    `tolerance` is relative, for numbers; `values` are the parameters' values, for formulas in which they were put in, and
-    `places` values of other symbols that have to be tried, in turn, in the place of random ones.
+    `tolerance` is relative, for numbers; `values` are the parameters' values, for formulas in which
+    they were put in, and `places` values of other symbols that have to be tried, in turn, in the
+    place of random ones.
     """
     if isinstance(second, tuple):
-        return all(equal(a, b, tolerance, values, places) for a, b in zip(first, second, strict=True))
+        return all(
+            equal(a, b, tolerance, values, places) for a, b in zip(first, second, strict=True)
+        )
     if isinstance(second, str):
         return bool(first == second)
     if isinstance(second, sp.MatrixBase):
-        return getattr(first, "shape", None) == second.shape and equal_formulas(list(first), list(second), values, places)
+        return getattr(first, "shape", None) == second.shape and equal_formulas(
+            list(first), list(second), values, places
+        )
     if isinstance(second, sp.Basic):
         return isinstance(first, sp.Basic) and equal_formulas([first], [second], values, places)
     scale = np.max(np.abs(second[np.isfinite(second)]), initial=0.0)
@@ -156,12 +186,15 @@ def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, 
 
 
 def equal_formulas(
-    first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], places: Places = ()
+    first: Sequence[sp.Expr],
+    second: Sequence[sp.Expr],
+    values: Mapping[sp.Symbol, Any],
+    places: Places = (),
 ) -> bool:
     """Whether the formulas agree, pairwise, at random points.
 
-    Symbols are told apart by name only.  Where one side has no parameter left as a symbol, the other's get their values.
-    What cannot be evaluated is not equal.
+    Symbols are told apart by name only.  Where one side has no parameter left as a symbol, the
+    other's get their values. What cannot be evaluated is not equal.
     """
     try:
         sides = [_by_name(formulas) for formulas in (first, second)]
@@ -171,12 +204,17 @@ def equal_formulas(
             sides = [[_with_numbers(f, numbers) for f in side] for side in sides]
         signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
         known, both = frozenset(signs.items()), all(map(_entire, sides[1]))
-        close = [FLOATS_AGREE if _has_floats(a) or _has_floats(b) else AGREE for a, b in zip(*sides, strict=True)]
+        close = [
+            FLOATS_AGREE if _has_floats(a) or _has_floats(b) else AGREE
+            for a, b in zip(*sides, strict=True)
+        ]
         for number in range(max(POINTS, len(places))):
             place = frozenset(places[number % len(places)].items() if places else ())
             for a, b, near in zip(*sides, close, strict=True):
                 left, right = (_value(f, number, known, both, place) for f in (a, b))
-                if not (left.is_number and right.is_number) or not abs(left - right) <= near * (1 + abs(right)):
+                if not (left.is_number and right.is_number) or not abs(left - right) <= near * (
+                    1 + abs(right)
+                ):
                     return False
     except Exception:  # SymPy has many ways to stop at a formula that makes no sense
         return False
@@ -187,7 +225,10 @@ def depends(formula: sp.Expr, names: Container[str]) -> list[str]:
     """Names of the symbols, among these, on whose values a formula depends."""
 
     def changes(s: sp.Symbol) -> bool:  # the root of a square feels the sign alone
-        return any(not equal_formulas([formula.xreplace({s: other})], [formula], {}) for other in (s + 1, -s))
+        return any(
+            not equal_formulas([formula.xreplace({s: other})], [formula], {})
+            for other in (s + 1, -s)
+        )
 
     return sorted(s.name for s in formula.free_symbols if s.name in names and changes(s))
 
@@ -195,10 +236,13 @@ def depends(formula: sp.Expr, names: Container[str]) -> list[str]:
 def with_values(formula: sp.Expr, values: Mapping[sp.Symbol, Any]) -> sp.Expr:
     """The formula with numbers in the place of parameters, which are told by their names."""
     numbers = {s.name: value for s, value in values.items()}
-    return formula.xreplace({s: sp.sympify(numbers[s.name]) for s in formula.free_symbols if s.name in numbers})
+    return formula.xreplace(
+        {s: sp.sympify(numbers[s.name]) for s in formula.free_symbols if s.name in numbers}
+    )
 
 
-@lru_cache(maxsize=20_000)  # an answer is compared with many mistakes, and a mistake with many answers
+# an answer is compared with many mistakes, and a mistake with many answers
+@lru_cache(maxsize=20_000)
 def _value(
     formula: sp.Expr,
     number: int,
@@ -206,30 +250,39 @@ def _value(
     both: bool,
     place: frozenset[tuple[sp.Symbol, sp.Expr]] = frozenset(),
 ) -> sp.Expr:
-    """The value at a random point: parameters with their own sign, other symbols of both signs, or positive only.
+    """The value at a random point: parameters with their own sign, other symbols of both signs, or
+    positive only.
 
-    Floats: powers of fractions would grow without bound.  The symbols of `place` have their values from there.
+    Floats: powers of fractions would grow without bound.  The symbols of `place` have their values
+    from there.
     """
     point = dict(place)  # exact, as Eq(k, 30) tells 30 from 30.0
     for s in formula.free_symbols - set(point):
         source = random.Random(f"{s.name}/{number}")
         sign = dict(signs).get(s, (1, -1, source.choice((1, -1)))[min(number, 2)] if both else 1)
-        point[s] = sp.Float(sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS)
+        point[s] = sp.Float(
+            sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS
+        )
     return sp.N(formula.xreplace(point), DIGITS)
 
 
 def _entire(formula: sp.Expr) -> bool:
-    """Whether a formula has no roots and the like: those differ in form where a variance becomes negative."""
-    return not formula.has(sp.log, sp.Abs) and all(power.exp.is_integer for power in formula.atoms(sp.Pow))
+    """Whether a formula has no roots and the like: those differ in form where a variance becomes
+    negative."""
+    return not formula.has(sp.log, sp.Abs) and all(
+        power.exp.is_integer for power in formula.atoms(sp.Pow)
+    )
 
 
 @lru_cache(maxsize=20_000)
 def _has_floats(formula: sp.Expr) -> bool:
-    """Whether a number in it was a float: 0.9 is 9/10, but 0.333333333333333 is what Python makes of 1/3."""
+    """Whether a number in it was a float: 0.9 is 9/10, but 0.333333333333333 is what Python makes
+    of 1/3."""
     least, most = FLOAT_DIGITS
     with localcontext(prec=most) as context:
         for one in formula.atoms(sp.Rational):
-            if max(abs(one.p), one.q).bit_length() > DOUBLE_BITS:  # a power of powers: as a decimal it takes minutes
+            # a power of powers: as a decimal it takes minutes
+            if max(abs(one.p), one.q).bit_length() > DOUBLE_BITS:
                 continue
             context.clear_flags()
             decimal = (Decimal(one.p) / Decimal(one.q)).normalize()

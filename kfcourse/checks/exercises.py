@@ -55,7 +55,8 @@ class Exercise:
     letter : str
     variant : Variant
     salt : str
-        Changes the hidden arguments, and nothing that a student sees: `kfcourse grade` asks with arguments of its own.
+        Changes the hidden arguments, and nothing that a student sees: `kfcourse grade` asks with
+        arguments of its own.
     """
 
     letter: str
@@ -63,18 +64,22 @@ class Exercise:
     salt: str = ""
 
     def __post_init__(self) -> None:
-        self.variant.plain("the exercises")  # whatever the set: each check asks the model for its letters
+        # whatever the set: each check asks the model for its letters
+        self.variant.plain("the exercises")
         if self.letter not in sets() or not sets()[self.letter].about_variant:
             return
         for which, where in (("y", "measurement"), ("x", "state")):
             if getattr(self.model.angles, which) and which not in sets()[self.letter].angles:
                 raise ExerciseError(
-                    f"set {self.letter} asks about a model without angles in the {where} (differences would have to go the short "
-                    f"way round), and variant {self.variant.name} has them: {self.model}; take another variant"
+                    f"set {self.letter} asks about a model without angles in the {where} "
+                    f"(differences would have to go the short "
+                    f"way round), and variant {self.variant.name} has them: {self.model}; take "
+                    f"another variant"
                 )
         if (known := self.model.known).steps < STEPS:
             raise ExerciseError(
-                f"set {self.letter} simulates {STEPS} steps, and an input of variant {self.variant.name} ends after "
+                f"set {self.letter} simulates {STEPS} steps, and an input of variant "
+                f"{self.variant.name} ends after "
                 f"{known.steps}: {self.model}; give it a value for every step"
             )
 
@@ -84,7 +89,8 @@ class Exercise:
 
     @cached_property
     def numbers(self) -> dict[str, float]:
-        """Personal numbers of this set and variant, by name; none for a set that asks about the variant's model only."""
+        """Personal numbers of this set and variant, by name; none for a set that asks about the
+        variant's model only."""
         of_set = sets()[self.letter].numbers
         return {} if of_set is None else of_set(replace(self, salt=""))
 
@@ -99,28 +105,38 @@ class Exercise:
         return Structures(self.model)
 
     def closed(self, kind: str) -> Structure:
-        """Structural functions with formulas, "linearised" or "gaussian"; ExerciseError if they have no closed form."""
+        """Structural functions with formulas, "linearised" or "gaussian"; ExerciseError if they
+        have no closed form."""
         try:
             return getattr(self.structures, kind)
         except NoClosedForm as error:
             raise ExerciseError(
-                f"set {self.letter} asks for formulas of the structural functions, and those of variant {self.variant.name} have "
+                f"set {self.letter} asks for formulas of the structural functions, and those of "
+                f"variant {self.variant.name} have "
                 f"no closed form ({error}); take another variant for this set"
             ) from None
 
     @cached_property
     def derivation(self) -> Worked:
-        """A right derivation of a structural function of the model; of the course's model, where none of this one is checked."""
-        from kfcourse.derivations.worked import right_derivation  # which a notebook that is graded does not find
+        """A right derivation of a structural function of the model; of the course's model, where
+        none of this one is checked."""
+        # which a notebook that is graded does not find
+        from kfcourse.derivations.worked import right_derivation
 
-        found = right_derivation(self.model) or right_derivation(find_variant(COURSE).plain("the exercises"))
+        found = right_derivation(self.model) or right_derivation(
+            find_variant(COURSE).plain("the exercises")
+        )
         if found is None:
-            raise ExerciseError(f"no derivation of variant {COURSE} can be checked: the package is broken; please report it")
+            raise ExerciseError(
+                f"no derivation of variant {COURSE} can be checked: the package is broken; please "
+                f"report it"
+            )
         return found
 
     @cached_property
     def given(self) -> Structures:
-        """Structural functions of the model that are given, not asked for: by quadrature where there is no closed form."""
+        """Structural functions of the model that are given, not asked for: by quadrature where
+        there is no closed form."""
         return Given(self.model)
 
     @property
@@ -131,11 +147,14 @@ class Exercise:
     def functions(self, kind: str, k: int | None = None) -> tuple[Callable, Callable]:
         """Structural functions of arrays: measure(m, d) -> h, G, F and predict(z, p) -> tau, Theta.
 
-        `kind` is "gaussian" or "linearised"; shapes (N, n), (N, n, n), (N, p), (N, p, n), (N, p, p).  Where the model depends on
-        the step, they are those of step k; without k they take it, `measure(m, d, k)`.
+        `kind` is "gaussian" or "linearised"; shapes (N, n), (N, n, n), (N, p), (N, p, n), (N, p,
+        p).  Where the model depends on the step, they are those of step k; without k they take it,
+        `measure(m, d, k)`.
         """
         if kind not in ("gaussian", "linearised"):
-            raise ExerciseError(f"no structural functions {kind!r}; there are gaussian and linearised")
+            raise ExerciseError(
+                f"no structural functions {kind!r}; there are gaussian and linearised"
+            )
         structure: Structure = getattr(self.given, kind)
         return array_functions(structure if k is None else structure.at(k))
 
@@ -143,17 +162,20 @@ class Exercise:
     def hidden(self) -> Structures:
         """Structural functions of a model like the variant's with other parameters.
 
-        An answer that works for any functions is called with these: where the variant has a 1, a forgotten factor would pass.
+        An answer that works for any functions is called with these: where the variant has a 1, a
+        forgotten factor would pass.
         """
         return Given(self.hidden_model)
 
     @cached_property
     def hidden_steps(self) -> list[int]:
-        """Steps that take the place of 0, 1, 2... in hidden functions: where an input rests, a wrong one would pass."""
+        """Steps that take the place of 0, 1, 2... in hidden functions: where an input rests, a
+        wrong one would pass."""
         return telling_steps(self.hidden_model)
 
     def hidden_functions(self) -> tuple[Callable, Callable]:
-        """Hidden measure and predict of arrays, which take the step where the model depends on it."""
+        """Hidden measure and predict of arrays, which take the step where the model depends on
+        it."""
         return array_functions(self.hidden.gaussian, self.hidden_steps if self.model.timed else ())
 
     @cached_property
@@ -162,13 +184,17 @@ class Exercise:
         return places(self.model) if self.model.timed else []
 
     def known(self, k: int) -> dict[sp.Symbol, float]:
-        """Values of k, t and the inputs at step k, for `subs`; empty where the model depends on none of them."""
+        """Values of k, t and the inputs at step k, for `subs`; empty where the model depends on
+        none of them."""
         return dict(zip(self.model.known.symbols, self.model.known.at(k).tolist(), strict=True))
 
     @cached_property
     def hidden_model(self) -> Model:
         factors = self.rng("hidden").uniform(1.1, 1.4, len(self.model.parameters))
-        changed = {name: float(value) * f for (name, value), f in zip(self.model.parameters.items(), factors, strict=True)}
+        changed = {
+            name: float(value) * f
+            for (name, value), f in zip(self.model.parameters.items(), factors, strict=True)
+        }
         return self.model.replace(**changed)
 
     @cached_property
@@ -190,7 +216,8 @@ class Exercise:
         return self.model.prior.mean
 
     def law(self, mean: Sequence[float], variance: float) -> tuple[Any, Any]:
-        """A normal law as your formulas take it: mean and covariance of independent components of equal variance.
+        """A normal law as your formulas take it: mean and covariance of independent components of
+        equal variance.
 
         Numbers for a scalar variant, matrices for a vector one.
         """
@@ -199,11 +226,13 @@ class Exercise:
         return (law[0][0], law[1][0]) if n == 1 else law
 
     def simulate(self, runs: int, steps: int, name: str) -> Trajectories:
-        """Trajectories of the variant, x (steps, runs, n) and y (steps, runs, p); the same name gives the same ones."""
+        """Trajectories of the variant, x (steps, runs, n) and y (steps, runs, p); the same name
+        gives the same ones."""
         return simulate(self.model, runs, steps, seed=int(self.rng(name).integers(2**31)))
 
     def rng(self, name: str) -> np.random.Generator:
-        """Random numbers that belong to this variant and name: for personal numbers and hidden arguments."""
+        """Random numbers that belong to this variant and name: for personal numbers and hidden
+        arguments."""
         return np.random.default_rng(zlib.crc32(f"{self.salt}{self.variant.name}/{name}".encode()))
 
     @cached_property
@@ -213,13 +242,16 @@ class Exercise:
 
     @cached_property
     def past(self) -> Attempts:
-        """What was handed in so far: the same wrong answer again gets a stronger hint, a later one may stand on it."""
+        """What was handed in so far: the same wrong answer again gets a stronger hint, a later one
+        may stand on it."""
         return Attempts()
 
     def check(self, name: str, answer: Any) -> Result:
         """Check the answer to a question: right, or what kind of mistake it looks like."""
         if name not in self.questions:
-            raise ExerciseError(f"set {self.letter} has no question {name!r}; it has {', '.join(self.questions)}")
+            raise ExerciseError(
+                f"set {self.letter} has no question {name!r}; it has {', '.join(self.questions)}"
+            )
         return check(self.questions[name], self, answer, past=self.past)
 
 
@@ -231,7 +263,8 @@ def exercise(letter: str, variant: str | Mapping[str, Any] = "53") -> Exercise:
     letter : str
         Of the set: "a", "b", ...
     variant : str or dict
-        Name of a variant in `kfcourse variants`, or a table with the keys of a file of variants, and `name`.
+        Name of a variant in `kfcourse variants`, or a table with the keys of a file of variants,
+        and `name`.
 
     Raises
     ------

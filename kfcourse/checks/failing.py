@@ -33,7 +33,8 @@ def shown(
     names, arguments : sequences
         Of the call.
     found, expected : formula, matrix or array
-        The result, or the part of it, that is wrong there.  Of the expected one only the place where they differ is used.
+        The result, or the part of it, that is wrong there.  Of the expected one only the place
+        where they differ is used.
     part : str
         What this part of the result is called.
     axes : sequence of str
@@ -46,12 +47,24 @@ def shown(
     return _array(names, arguments, np.asarray(found), np.asarray(expected), part, axes)
 
 
-def _formula(arguments: Sequence[Any], found: Any, part: str, values: Mapping[sp.Symbol, Any]) -> str:
-    given = [s for one in arguments if hasattr(one, "free_symbols") for s in sorted(one.free_symbols, key=str)]
+def _formula(
+    arguments: Sequence[Any], found: Any, part: str, values: Mapping[sp.Symbol, Any]
+) -> str:
+    given = [
+        s
+        for one in arguments
+        if hasattr(one, "free_symbols")
+        for s in sorted(one.free_symbols, key=str)
+    ]
     others = sorted(getattr(found, "free_symbols", set()) - set(given), key=str)
     known = {symbol(s.name): value for s, value in values.items()}
-    point = {s: sp.Float(DECIMALS[i % len(DECIMALS)], 6) for i, s in enumerate(dict.fromkeys(given))}
-    point |= {s: sp.Float(known.get(symbol(s.name), DECIMALS[-1 - i % len(DECIMALS)]), 6) for i, s in enumerate(others)}
+    point = {
+        s: sp.Float(DECIMALS[i % len(DECIMALS)], 6) for i, s in enumerate(dict.fromkeys(given))
+    }
+    point |= {
+        s: sp.Float(known.get(symbol(s.name), DECIMALS[-1 - i % len(DECIMALS)]), 6)
+        for i, s in enumerate(others)
+    }
     entries = list(found) if isinstance(found, sp.MatrixBase) else [found]
     numbers = [sp.N(entry.xreplace(point), 8) for entry in entries]
     if not all(number.is_real for number in numbers):
@@ -63,13 +76,23 @@ def _formula(arguments: Sequence[Any], found: Any, part: str, values: Mapping[sp
 
 
 def _array(
-    names: Sequence[str], arguments: Sequence[Any], found: np.ndarray, expected: np.ndarray, part: str, axes: Sequence[str]
+    names: Sequence[str],
+    arguments: Sequence[Any],
+    found: np.ndarray,
+    expected: np.ndarray,
+    part: str,
+    axes: Sequence[str],
 ) -> str:
     place: tuple[int, ...] = ()
     if axes and found.ndim >= len(axes):
         scale = np.max(np.abs(expected[np.isfinite(expected)]), initial=0.0)
         wrong = ~np.isclose(found, expected, rtol=1e-6, atol=1e-6 * scale, equal_nan=True)
-        place = tuple(int(i) for i in (np.argwhere(wrong) if wrong.any() else np.zeros((1, found.ndim), int))[0][: len(axes)])
+        place = tuple(
+            int(i)
+            for i in (np.argwhere(wrong) if wrong.any() else np.zeros((1, found.ndim), int))[0][
+                : len(axes)
+            ]
+        )
         found = found[place]
     sizes = expected.shape[: len(place)]
     inputs = []
@@ -80,14 +103,18 @@ def _array(
         if place and len(sizes) > 1 and array.shape[: len(sizes)] == sizes:
             array = array[: place[0] + 1, place[1]]  # of this trajectory, up to this step
         elif place and array.ndim and array.shape[:1] == sizes[:1]:
-            if axes[0] == "step":  # what is found of a row may need its neighbours, as an interval does
+            # what is found of a row may need its neighbours, as an interval does
+            if axes[0] == "step":
                 first, end = max(0, place[0] - 1), min(place[0] + 2, len(array))
                 name, array = f"{name}[{first}:{end}]", array[first:end]
             else:
                 array = array[place[0]]
         inputs.append(f"{name} = {_numbers(array)}")
     where = "".join(f", {axis} {i}" for axis, i in zip(axes, place, strict=False))
-    return f"An example{where}{' (counted from 0)' if where else ''}: for {', '.join(inputs)} {_yours(part, found)}."
+    return (
+        f"An example{where}{' (counted from 0)' if where else ''}: for {', '.join(inputs)} "
+        f"{_yours(part, found)}."
+    )
 
 
 def _yours(part: str, value: np.ndarray) -> str:
@@ -99,5 +126,10 @@ def _numbers(array: np.ndarray) -> str:
     if array.size > NUMBERS:
         first = ", ".join(f"{value:.4g}" for value in array.ravel()[:3])
         return f"[{first}, ...] of shape {array.shape}"
-    text = np.array2string(array, formatter={"float_kind": lambda value: f"{value:.4g}"}, separator=", ", max_line_width=10**6)
+    text = np.array2string(
+        array,
+        formatter={"float_kind": lambda value: f"{value:.4g}"},
+        separator=", ",
+        max_line_width=10**6,
+    )
     return " ".join(text.split())

@@ -1,8 +1,9 @@
-"""What can be said of any wrong answer, whatever the question: its sign, an argument without effect, where it is right.
+"""What can be said of any wrong answer, whatever the question: its sign, an argument without
+effect, where it is right.
 
-Most hints are rows of name, sentence and what would have been found if the sentence were so; one loop compares.  The others
-ask where the answer is right, or how it depends on its arguments.  Each looks at one result of an answer, called with all
-hidden arguments, and at what was expected.
+Most hints are rows of name, sentence and what would have been found if the sentence were so; one
+loop compares.  The others ask where the answer is right, or how it depends on its arguments.  Each
+looks at one result of an answer, called with all hidden arguments, and at what was expected.
 """
 
 from __future__ import annotations
@@ -29,18 +30,25 @@ Row = tuple[str, str, Callable[[], Sequence[Any]]]  # name, sentence, what would
 
 
 def each(value: Any, change: Callable[[Any], Any]) -> Any:
-    """A change of every entry; the power of a symbolic matrix would be another thing, and may take for ever."""
+    """A change of every entry; the power of a symbolic matrix would be another thing, and may take
+    for ever."""
     return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
 
 
 INVERSE = "It looks like the inverse of what it should be."
 OF_RESULT: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
-    ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
+    (
+        "transposed",
+        "It looks transposed.",
+        lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2),
+    ),
     (
         "root",
         "It is the square root of what it should be, as a standard deviation is of a variance.",
-        lambda v: each(v, lambda entry: entry**sp.S.Half if isinstance(entry, sp.Basic) else np.sqrt(entry)),
+        lambda v: each(
+            v, lambda entry: entry**sp.S.Half if isinstance(entry, sp.Basic) else np.sqrt(entry)
+        ),
     ),
     ("factor-2", "It is half of what it should be.", lambda v: v / 2),
     ("factor-half", "It is twice what it should be.", lambda v: 2 * v),
@@ -63,28 +71,47 @@ OF_ARGUMENT: tuple[tuple[str, Callable[[Any], Any]], ...] = (
 
 
 def results(case: Case) -> Iterator[Row]:
-    """The right result with one simple thing done to it, another result, or an argument as it came."""
+    """The right result with one simple thing done to it, another result, or an argument as it
+    came."""
     for name, says, change in OF_RESULT:
         yield name, says, partial(applied, change, case.expected)
     for name, expected in case.others:
-        yield "another-result", f"That is what belongs in the place of {name}.", partial(list, expected)
+        yield (
+            "another-result",
+            f"That is what belongs in the place of {name}.",
+            partial(list, expected),
+        )
     for place, name in enumerate(case.names if case.numeric else ()):
         given = [values[place] for values in case.arguments]
         if all(isinstance(value, np.ndarray) for value in given):
-            yield "unchanged", f"That is the argument `{name}`, unchanged.", partial(applied, np.nan_to_num, given)
+            yield (
+                "unchanged",
+                f"That is the argument `{name}`, unchanged.",
+                partial(applied, np.nan_to_num, given),
+            )
 
 
 def arguments(case: Case) -> Iterator[Row]:
-    """What the right answer gives with arguments exchanged; right but for a step, a term or a factor."""
+    """What the right answer gives with arguments exchanged; right but for a step, a term or a
+    factor."""
     for i, j in combinations(range(len(case.names)), 2):
         if all(alike(values[i], values[j]) for values in case.arguments):
-            says = f"It is right with `{case.names[i]}` and `{case.names[j]}` exchanged: which is which?"
+            says = (
+                f"It is right with `{case.names[i]}` and `{case.names[j]}` exchanged: which is "
+                f"which?"
+            )
             yield "exchanged", says, partial(instead, case, {i: itemgetter(j), j: itemgetter(i)})
-    known = [(f"the argument `{name}`", [values[i] for values in case.arguments]) for i, name in enumerate(case.names)]
+    known = [
+        (f"the argument `{name}`", [values[i] for values in case.arguments])
+        for i, name in enumerate(case.names)
+    ]
     known += [(f"the result {name}", list(values)) for name, values in case.others]
     known += [("one", [1.0 if case.numeric else sp.S.One] * len(case.expected))]
     for what, values in known:
-        if not all(fits(value, wanted, case.numeric) for value, wanted in zip(values, case.expected, strict=True)):
+        if not all(
+            fits(value, wanted, case.numeric)
+            for value, wanted in zip(values, case.expected, strict=True)
+        ):
             continue
         for name, change in (
             ("term", lambda b, v: b - v),
@@ -98,16 +125,26 @@ def arguments(case: Case) -> Iterator[Row]:
 
 
 def replaced(case: Case) -> Iterator[Row]:
-    """What the right answer gives with something else in the place of an argument, or of what an argument returns."""
+    """What the right answer gives with something else in the place of an argument, or of what an
+    argument returns."""
     for place, name in enumerate(case.names if case.numeric else ()):
         for words, change in OF_ARGUMENT:
             for which in range(3) if callable(case.arguments[0][place]) else (None,):
                 other = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
-                says = f"The right answer would give that with {words.format(other)} in the place of {other}."
-                yield "replaced", says, partial(instead, case, {place: partial(altered, place, change, which)})
+                says = (
+                    f"The right answer would give that with {words.format(other)} in the place "
+                    f"of {other}."
+                )
+                yield (
+                    "replaced",
+                    says,
+                    partial(instead, case, {place: partial(altered, place, change, which)}),
+                )
 
 
-def altered(place: int, change: Callable[[Any], Any], which: int | None, values: Sequence[Any]) -> Any:
+def altered(
+    place: int, change: Callable[[Any], Any], which: int | None, values: Sequence[Any]
+) -> Any:
     """One of the arguments, changed."""
     return changed(values[place], change, which)
 
@@ -121,7 +158,9 @@ def instead(case: Case, other: dict[int, Callable[[Sequence[Any]], Any]]) -> lis
     """What the right answer gives with other arguments in some places."""
     found = []
     for values, wanted in zip(copy.deepcopy(case.arguments), case.expected, strict=True):
-        result = case.sensitivity.answers[0](*(other[i](values) if i in other else v for i, v in enumerate(values)))
+        result = case.sensitivity.answers[0](
+            *(other[i](values) if i in other else v for i, v in enumerate(values))
+        )
         found.append(like(result[case.part] if case.sensitivity.several else result, wanted))
     return found
 
@@ -135,7 +174,11 @@ def alike(first: Any, second: Any) -> bool:
 def fits(value: Any, wanted: Any, numeric: bool) -> bool:
     """Whether a value may be a term of a result: of the same shape, or a number."""
     if numeric:
-        return not callable(value) and not isinstance(value, sp.Basic) and np.shape(value) in ((), np.shape(wanted))
+        return (
+            not callable(value)
+            and not isinstance(value, sp.Basic)
+            and np.shape(value) in ((), np.shape(wanted))
+        )
     return isinstance(value, sp.Basic | int | float) or np.shape(value) == np.shape(wanted)
 
 
@@ -146,8 +189,14 @@ def compared(rows: Callable[[Case], Iterator[Row]]) -> Callable[[Case], Said | N
         for name, says, made in rows(case):
             try:
                 would = list(made())
-                shaped = all(np.shape(a) == np.shape(b) for a, b in zip(case.found, would, strict=True))
-                if shaped and case.agree(case.found, would) and not case.agree(would, case.expected):
+                shaped = all(
+                    np.shape(a) == np.shape(b) for a, b in zip(case.found, would, strict=True)
+                )
+                if (
+                    shaped
+                    and case.agree(case.found, would)
+                    and not case.agree(would, case.expected)
+                ):
                     return name, says
             except (OutOfTime, KeyboardInterrupt):
                 raise
@@ -164,16 +213,23 @@ def compared(rows: Callable[[Case], Iterator[Row]]) -> Callable[[Case], Said | N
 def vanishing(case: Case) -> Said | None:
     """Nothing, or nothing but rounding."""
     if case.numeric:
-        zero = all(np.abs(a).max(initial=0.0) <= ROUNDING * np.abs(b).max(initial=0.0) for a, b in case.pairs)
+        zero = all(
+            np.abs(a).max(initial=0.0) <= ROUNDING * np.abs(b).max(initial=0.0)
+            for a, b in case.pairs
+        )
         if not zero or not all(np.any(b) for b in case.expected):
             return None
     elif not case.agree(case.found, [0 * value for value in case.expected]):
         return None
-    return "vanishing", "It is zero: is that what is left when all cancels, or is something multiplied by zero?"
+    return (
+        "vanishing",
+        "It is zero: is that what is left when all cancels, or is something multiplied by zero?",
+    )
 
 
 def rounded(case: Case) -> Said | None:
-    """Right, and then rounded; to whole numbers where there are several, as ones and zeros say nothing."""
+    """Right, and then rounded; to whole numbers where there are several, as ones and zeros say
+    nothing."""
     if case.numeric:
         whole = len(np.unique(np.concatenate([np.ravel(a) for a in case.found]))) > 2
         for decimals in range(0 if whole else 1, 9):
@@ -186,10 +242,22 @@ def rough(case: Case) -> Said | None:
     """Right to some digits."""
     if not case.numeric or not all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
         return None
-    single = all(np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs)
-    if single and any(not np.array_equal(mine, np.round(mine), equal_nan=True) for mine, _ in case.pairs):
-        return "precision", "It is right to the 7 digits of single precision (float32): compute in double precision (float64)."
-    return "precision", "It is nearly right: is something rounded, or something small left out, added or divided otherwise?"
+    single = all(
+        np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs
+    )
+    if single and any(
+        not np.array_equal(mine, np.round(mine), equal_nan=True) for mine, _ in case.pairs
+    ):
+        return (
+            "precision",
+            "It is right to the 7 digits of single precision (float32): compute in double "
+            "precision (float64).",
+        )
+    return (
+        "precision",
+        "It is nearly right: is something rounded, or something small left out, added or divided "
+        "otherwise?",
+    )
 
 
 def sometimes(case: Case) -> Said | None:
@@ -197,27 +265,50 @@ def sometimes(case: Case) -> Said | None:
     right = [case.agree([a], [b]) for a, b in case.pairs]
     if not any(good and telling for good, telling in zip(right, case.telling, strict=True)):
         return None
-    sizes = [int(np.size(b)) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs] if case.numeric else [1] * len(right)
-    if len(set(sizes)) > 1 and all((size == 1) == good for size, good in zip(sizes, right, strict=True)):
+    sizes = (
+        [int(np.size(b)) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs]
+        if case.numeric
+        else [1] * len(right)
+    )
+    if len(set(sizes)) > 1 and all(
+        (size == 1) == good for size, good in zip(sizes, right, strict=True)
+    ):
         return (
             "scalars-only",
-            "It is right for scalars only: look at the order of the matrices, at what is transposed, "
+            "It is right for scalars only: look at the order of the matrices, at what is "
+            "transposed, "
             "and at what is done entry by entry or over all axes at once.",
         )
     return (
         "sometimes",
-        f"It is right for {sum(right)} of {len(right)} hidden inputs: a case is left out, or it holds for a special one only.",
+        f"It is right for {sum(right)} of {len(right)} hidden inputs: a case is left out, or it "
+        f"holds for a special one only.",
     )
 
 
 def first_step(case: Case) -> Said | None:
     """A run that starts well, or each step of which stands beside its place."""
-    if not case.numeric or case.axes[:1] != ("step",) or not all(b.ndim and len(b) > 3 for _, b in case.pairs):
+    if (
+        not case.numeric
+        or case.axes[:1] != ("step",)
+        or not all(b.ndim and len(b) > 3 for _, b in case.pairs)
+    ):
         return None
-    later = [not case.agree([a[k : k + 1]], [b[k : k + 1]]) for a, b in case.pairs for k in range(1, len(b))]
+    later = [
+        not case.agree([a[k : k + 1]], [b[k : k + 1]])
+        for a, b in case.pairs
+        for k in range(1, len(b))
+    ]
     if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs) and 2 * sum(later) > len(later):
-        return "from-second-step", "The first step is right, later ones are not: what is handed on from one step to the next?"
-    for mine, right, word in ((slice(1, None), slice(None, -1), "late"), (slice(None, -1), slice(1, None), "early")):
+        return (
+            "from-second-step",
+            "The first step is right, later ones are not: what is handed on from one step to the "
+            "next?",
+        )
+    for mine, right, word in (
+        (slice(1, None), slice(None, -1), "late"),
+        (slice(None, -1), slice(1, None), "early"),
+    ):
         if case.agree([a[mine] for a in case.found], [b[right] for b in case.expected]):
             return "shifted", f"The values are right, but each stands one step too {word}."
     return None
@@ -227,7 +318,10 @@ def factor_or_term(case: Case) -> Said | None:
     """A factor, or a term, that is the same everywhere, or for all that a call gives."""
     if not case.numeric:
         return None
-    if all(np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max() for a, b in case.pairs):
+    if all(
+        np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max()
+        for a, b in case.pairs
+    ):
         return "term", "It is right but for a term that is the same everywhere."
     if all(np.size(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
         return "term", "It is right but for a term that is one number for all that a call gives."
@@ -247,45 +341,81 @@ def entries(case: Case) -> Said | None:
     else:
         lead, pairs = (
             0,
-            [(np.array(a), np.array(b)) for a, b in case.pairs if isinstance(b, sp.MatrixBase) and len(case.pairs) == 1],
+            [
+                (np.array(a), np.array(b))
+                for a, b in case.pairs
+                if isinstance(b, sp.MatrixBase) and len(case.pairs) == 1
+            ],
         )
     shapes = {b.shape[lead:] for _, b in pairs}
-    if len(shapes) != 1 or len(shape := shapes.pop()) not in (1, 2) or max(shape) > 6 or np.prod(shape) < 2:
+    if (
+        len(shapes) != 1
+        or len(shape := shapes.pop()) not in (1, 2)
+        or max(shape) > 6
+        or np.prod(shape) < 2
+    ):
         return None
-    right = np.array([all(case.agree([a[(..., *i)][()]], [b[(..., *i)][()]]) for a, b in pairs) for i in np.ndindex(shape)])
+    right = np.array(
+        [
+            all(case.agree([a[(..., *i)][()]], [b[(..., *i)][()]]) for a, b in pairs)
+            for i in np.ndindex(shape)
+        ]
+    )
     wrong = ~right.reshape(shape)
     if wrong.all() or not wrong.any():
         return None
     places = (np.argwhere(wrong) + 1).tolist()
     if len(shape) == 1:
         which = ", ".join(str(place) for (place,) in places)
-        return "components", f"Only component{'s' * (len(places) > 1)} {which} {'are' if len(places) > 1 else 'is'} wrong."
+        return (
+            "components",
+            f"Only component{'s' * (len(places) > 1)} {which} "
+            f"{'are' if len(places) > 1 else 'is'} wrong.",
+        )
     if len(places) == 1:
         return "entry", f"Only the entry in row {places[0][0]}, column {places[0][1]} is wrong."
     if shape[0] == shape[1] and np.array_equal(~wrong, np.eye(len(wrong), dtype=bool)):
-        return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
+        return (
+            "off-diagonal",
+            "The diagonal is right, the rest is not: what has one component to do with another?",
+        )
     return None
 
 
 NOT_SYMMETRIC = "The result should be symmetric and is not: is a factor missing on one side?"
-DIGITS_LOST = "Some of the matrices are not symmetric, most are: are digits lost, as where something nearly singular is inverted?"
+DIGITS_LOST = (
+    "Some of the matrices are not symmetric, most are: are digits lost, as where "
+    "something nearly singular is inverted?"
+)
 
 
 def improper(case: Case) -> Said | None:
     """A covariance that is none."""
     for found, expected in case.pairs:
         if isinstance(expected, sp.MatrixBase):
-            if expected.rows == expected.cols > 1 and case.agree([expected], [expected.T]) and not case.agree([found], [found.T]):
+            if (
+                expected.rows == expected.cols > 1
+                and case.agree([expected], [expected.T])
+                and not case.agree([found], [found.T])
+            ):
                 return "not-symmetric", NOT_SYMMETRIC
         elif case.numeric and expected.ndim > 1 and expected.shape[-1] == expected.shape[-2]:
             if not same(expected, expected.swapaxes(-1, -2)):
                 return None
             if not np.allclose(found, found.swapaxes(-1, -2)):
                 symmetric = np.isclose(found, found.swapaxes(-1, -2)).all(axis=(-2, -1))
-                return ("digits-lost", DIGITS_LOST) if symmetric.mean() > 0.5 else ("not-symmetric", NOT_SYMMETRIC)
+                return (
+                    ("digits-lost", DIGITS_LOST)
+                    if symmetric.mean() > 0.5
+                    else ("not-symmetric", NOT_SYMMETRIC)
+                )
             own, right = (np.diagonal(matrix, axis1=-2, axis2=-1) for matrix in (found, expected))
-            if (own < -1e-9 * np.max(right)).any() and (right >= 0).all():  # zero is negative at times, by rounding
-                return "negative-variance", "There are negative variances in it: what is subtracted there?"
+            # zero is negative at times, by rounding
+            if (own < -1e-9 * np.max(right)).any() and (right >= 0).all():
+                return (
+                    "negative-variance",
+                    "There are negative variances in it: what is subtracted there?",
+                )
     return None
 
 
@@ -297,13 +427,30 @@ def unused(case: Case) -> Said | None:
     extra: list[str] = []
     if case.numeric:
         missing, form = case.sensitivity.unused(case.part), "`{}`"
-        if all(np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair):  # it does not feel a small change
-            missing = [name for name in missing if isinstance(case.arguments[0][case.names.index(name)], int)]
+        # it does not feel a small change
+        if all(np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair):
+            missing = [
+                name
+                for name in missing
+                if isinstance(case.arguments[0][case.names.index(name)], int)
+            ]
     else:
-        mine, theirs = ({name for f in formulas(case, which) for name in symbols_of(f)} for which in (0, 1))
-        given = {s.name for values in case.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
+        mine, theirs = (
+            {name for f in formulas(case, which) for name in symbols_of(f)} for which in (0, 1)
+        )
+        given = {
+            s.name
+            for values in case.arguments
+            for v in values
+            if hasattr(v, "free_symbols")
+            for s in v.free_symbols
+        }
         numbers = any(not n.is_integer for f in formulas(case, 0) for n in f.atoms(sp.Number))
-        missing, extra, form = sorted((theirs & given if numbers else theirs) - mine), sorted(mine - theirs), "{}"
+        missing, extra, form = (
+            sorted((theirs & given if numbers else theirs) - mine),
+            sorted(mine - theirs),
+            "{}",
+        )
     if missing:
         which = ", ".join(map(form.format, missing))
         what = "forgotten, or cancelled, or is something of the notebook used instead?"
@@ -321,11 +468,18 @@ def symbols_of(formula: sp.Expr) -> list[str]:
     return depends(formula, {s.name for s in formula.free_symbols})
 
 
-def with_symbol(case: Case, change: Callable[[sp.Symbol], sp.Expr]) -> Iterator[tuple[str, list[sp.Expr], list[sp.Expr]]]:
+def with_symbol(
+    case: Case, change: Callable[[sp.Symbol], sp.Expr]
+) -> Iterator[tuple[str, list[sp.Expr], list[sp.Expr]]]:
     """For each symbol of both sides: the student's formulas and the right ones with it changed."""
     sides = [formulas(case, which) for which in (0, 1)]
-    for name in sorted(set.intersection(*({s.name for f in side for s in f.free_symbols} for side in sides))):
-        mine, right = ([f.xreplace({s: change(s) for s in f.free_symbols if s.name == name}) for f in side] for side in sides)
+    for name in sorted(
+        set.intersection(*({s.name for f in side for s in f.free_symbols} for side in sides))
+    ):
+        mine, right = (
+            [f.xreplace({s: change(s) for s in f.free_symbols if s.name == name}) for f in side]
+            for side in sides
+        )
         if not any(f.has(sp.nan, sp.zoo, sp.oo) for f in (*mine, *right)):
             yield name, mine, right
 
@@ -335,14 +489,19 @@ def with_argument(case: Case, factor: float) -> Iterator[tuple[str, list[Any], l
     for place, name in enumerate(case.names):
         called = case.sensitivity.called(place, lambda value: scaled(value, factor))
         right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
-        if called and all(np.isfinite(one).all() and one.shape == two.shape for one, two in zip(mine, right, strict=True)):
+        if called and all(
+            np.isfinite(one).all() and one.shape == two.shape
+            for one, two in zip(mine, right, strict=True)
+        ):
             yield name, mine, right
 
 
 def limit(case: Case) -> Said | None:
     """Right where something is zero: what comes in with it is wrong."""
     pairs = with_argument(case, 0.0) if case.numeric else with_symbol(case, lambda _: sp.S.Zero)
-    where = [name for name, mine, right in pairs if any(map(np.any, right)) and case.agree(mine, right)]
+    where = [
+        name for name, mine, right in pairs if any(map(np.any, right)) and case.agree(mine, right)
+    ]
     if where and case.numeric:  # where nothing is brought in near zero either, that tells nothing
         near = {name for name, mine, right in with_argument(case, 0.01) if case.agree(mine, right)}
         where = [name for name in where if name not in near]
@@ -363,19 +522,29 @@ def power(case: Case) -> Said | None:
         grown: dict[str, list[list[float]]] = {}
         for factor in (2.0, 4.0):
             for name, *after in with_argument(case, factor):
-                grown.setdefault(name, []).append([ratio(new, old) for new, old in zip(after, before, strict=True)])
+                grown.setdefault(name, []).append(
+                    [ratio(new, old) for new, old in zip(after, before, strict=True)]
+                )
         for name, growth in grown.items():
             if len(growth) == 2 and np.isfinite(growth).all():
                 (mine, right), again = growth
-                if abs(right - mine) > 1e-6 and np.allclose(again, [mine**2, right**2], rtol=1e-6):  # powers, both of them
-                    return "power", f"It grows with another power of `{name}` than it should: check the units."
+                # powers, both of them
+                if abs(right - mine) > 1e-6 and np.allclose(again, [mine**2, right**2], rtol=1e-6):
+                    return (
+                        "power",
+                        f"It grows with another power of `{name}` than it should: check the units.",
+                    )
         return None
     for name, *sides in with_symbol(case, lambda s: 2 * s):
         powers = [
-            [k for k in POWERS if case.agree(new, [2**k * f for f in formulas(case, side)])] for side, new in enumerate(sides)
+            [k for k in POWERS if case.agree(new, [2**k * f for f in formulas(case, side)])]
+            for side, new in enumerate(sides)
         ]
         if all(len(k) == 1 for k in powers) and powers[0] != powers[1]:
-            return "power", f"It grows with another power of {name} than it should: check the units."
+            return (
+                "power",
+                f"It grows with another power of {name} than it should: check the units.",
+            )
     return None
 
 
@@ -387,16 +556,24 @@ def ratio(new: Sequence[Any], old: Sequence[Any]) -> float:
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in pairs]) for which in (0, 1))
     clear = np.abs(b) > 1e-9 * np.max(np.abs(b), initial=0.0)
     ratios = a[clear] / b[clear]
-    return float(ratios[0]) if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max() else np.nan
+    return (
+        float(ratios[0])
+        if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max()
+        else np.nan
+    )
 
 
 def narrow(case: Case) -> Said | None:
-    """Right but for a factor, or a term, that is a number or depends on one symbol, where the right formula has more."""
+    """Right but for a factor, or a term, that is a number or depends on one symbol, where the right
+    formula has more."""
     if case.numeric or any(len(side[0]) > 1 for side in case.formulas):
         return None
     pairs = [(mine, theirs) for (mine,), (theirs,) in case.formulas]
     everything = {name for _, theirs in pairs for name in symbols_of(theirs)}
-    for what, apart in (("factor", [a / b for a, b in pairs if b != 0]), ("term", [a - b for a, b in pairs])):
+    for what, apart in (
+        ("factor", [a / b for a, b in pairs if b != 0]),
+        ("term", [a - b for a, b in pairs]),
+    ):
         on = {name for one in apart for name in symbols_of(one)}
         if len(apart) == len(pairs) and on < everything and len(on) < 2:
             which = f"depends on {on.pop()} only" if on else "is a number"
@@ -414,8 +591,13 @@ def terms(case: Case) -> Said | None:
     if theirs < mine:
         return "terms", "All terms that belong there are there, and something else besides."
     right = ", ".join(sorted(map(str, mine & theirs)))
-    more = "another is missing" if mine < theirs else "look at the rest"  # which may be right in another form, in part
-    return "terms", f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} right; {more}."
+    # which may be right in another form, in part
+    more = "another is missing" if mine < theirs else "look at the rest"
+    return (
+        "terms",
+        f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} "
+        f"right; {more}.",
+    )
 
 
 def direction(case: Case) -> Said | None:
@@ -425,12 +607,20 @@ def direction(case: Case) -> Said | None:
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
     wrong = np.isfinite(b) & ~np.isclose(a, b, rtol=1e-9, atol=0)
     larger = np.abs(a[wrong]) > np.abs(b[wrong])
-    signs = a[wrong] * b[wrong] < 0, (a[wrong] < 0) & (b[wrong] == 0)  # below zero is not too large, whatever its size
+    # below zero is not too large, whatever its size
+    signs = a[wrong] * b[wrong] < 0, (a[wrong] < 0) & (b[wrong] == 0)
     if np.sum(wrong) < 3 or np.any(signs) or larger.any() != larger.all():
         return None
     if larger.all():
-        return "too-large", "It is too large wherever it is wrong: is something added that does not belong there, or not divided?"
-    return "too-small", "It is too small wherever it is wrong: is something missing, or divided once too often?"
+        return (
+            "too-large",
+            "It is too large wherever it is wrong: is something added that does not belong there, "
+            "or not divided?",
+        )
+    return (
+        "too-small",
+        "It is too small wherever it is wrong: is something missing, or divided once too often?",
+    )
 
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (

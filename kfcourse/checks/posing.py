@@ -24,9 +24,19 @@ def unposed(variant: Variant) -> Finding | None:
             try:
                 result = exercise.check(name, question.answer(exercise))
             except Exception as error:  # whatever a degenerate model leads to
-                return Finding(False, f"question {name} of the exercises cannot be posed ({type(error).__name__}: {error})")
+                return Finding(
+                    False,
+                    f"question {name} of the exercises cannot be posed ({type(error).__name__}: "
+                    f"{error})",
+                )
             if result.trouble:
-                return Finding(False, f"question {name} of the exercises cannot be posed ({result.trouble})")
+                return Finding(
+                    False, f"question {name} of the exercises cannot be posed ({result.trouble})"
+                )
             if not result.passed:
-                return Finding(False, f"question {name} of the exercises does not accept its own answer: {result.message}")
+                return Finding(
+                    False,
+                    f"question {name} of the exercises does not accept its own answer: "
+                    f"{result.message}",
+                )
     return None

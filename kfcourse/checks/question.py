@@ -1,4 +1,5 @@
-"""What a question is: its key, its known mistakes, its hidden arguments; and what a check says of an answer."""
+"""What a question is: its key, its known mistakes, its hidden arguments; and what a check says of
+an answer."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ Answer = Callable[..., Any]
 class ForVariant(NamedTuple):
     """An answer that is another function for every variant: Exercise -> function.
 
-    `name` is that of the student's function, if it is a key; `step` the answer made of earlier answers, which it calls.
+    `name` is that of the student's function, if it is a key; `step` the answer made of earlier
+    answers, which it calls.
     """
 
     make: Callable[[Exercise], Answer]
@@ -76,7 +78,8 @@ class Question:
     key : callable or ForVariant
         The right answer: a function with the name and the arguments of the student's.
     arguments : callable
-        Exercise -> list of argument tuples with which every answer is called: symbols, or numbers from hidden seeds.
+        Exercise -> list of argument tuples with which every answer is called: symbols, or numbers
+        from hidden seeds.
     mistakes : tuple of Mistake
     parts : tuple of str
         Names of the results, if the answer returns several; each is then diagnosed by itself.
@@ -85,9 +88,11 @@ class Question:
     advice : str
         Said when the same wrong answer comes again: where to look, never the answer.
     axes : tuple of str
-        What the leading axes of the results are, ("step", "trajectory"); of arguments of such a shape, too.
+        What the leading axes of the results are, ("step", "trajectory"); of arguments of such a
+        shape, too.
     spare : tuple of str
-        Arguments of the key that follow from the others, as Q does from Psi = A p A^T + Q: an answer may do without one.
+        Arguments of the key that follow from the others, as Q does from Psi = A p A^T + Q: an
+        answer may do without one.
     """
 
     name: str

@@ -29,9 +29,11 @@ class ExerciseSet:
     numbers : callable, optional
         Exercise -> personal numbers by name, for a set that needs others than the variant's.
     about_variant : bool
-        Whether the questions are about the variant's model; otherwise the set has a model of its own.
+        Whether the questions are about the variant's model; otherwise the set has a model of its
+        own.
     angles : tuple of {"x", "y"}
-        Which of state and measurement may have components that are angles, if the questions are about the variant's model.
+        Which of state and measurement may have components that are angles, if the questions are
+        about the variant's model.
     """
 
     letter: str
@@ -52,7 +54,9 @@ class ExerciseSet:
 def register(one: ExerciseSet) -> None:
     """Add a set; ValueError if its letter is taken."""
     if one.letter in _registered:
-        raise ValueError(f"two exercise sets {one.letter!r}: {_registered[one.letter].folder} and {one.folder}")
+        raise ValueError(
+            f"two exercise sets {one.letter!r}: {_registered[one.letter].folder} and {one.folder}"
+        )
     _registered[one.letter] = one
 
 
@@ -62,6 +66,7 @@ def folders() -> set[Path]:
 
 
 def sets() -> Mapping[str, ExerciseSet]:
-    """All exercise sets by letter; the package of sets, which registers them, is imported at the first call."""
+    """All exercise sets by letter; the package of sets, which registers them, is imported at the
+    first call."""
     import_module("kfcourse.exercises")
     return MappingProxyType(_registered)

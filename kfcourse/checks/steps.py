@@ -1,4 +1,5 @@
-"""Time and inputs in the questions: functions that take the step, and the steps at which they are told apart."""
+"""Time and inputs in the questions: functions that take the step, and the steps at which they are
+told apart."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def at_step(function: Function, k: int) -> Function:
 
 
 def at_wrong_step(function: Function, k: int) -> Function:
-    """The same for a known mistake; ValueError if the function takes no step, so that there is none to mistake."""
+    """The same for a known mistake; ValueError if the function takes no step, so that there is none
+    to mistake."""
     if not vars(function).get("of_steps"):
         raise ValueError("only where the model depends on the step")
     return at_step(function, k)
@@ -43,10 +45,11 @@ def full(matrix: Array, runs: int) -> Array:
 
 
 def array_functions(structure: Structure, steps: Sequence[int] = ()) -> tuple[Function, Function]:
-    """(measure, predict) of full arrays, as students get them: (m, d) -> h, G, F and (z, p) -> tau, Theta.
+    """(measure, predict) of full arrays, as students get them: (m, d) -> h, G, F and (z, p) -> tau,
+    Theta.
 
-    Those of a structure that depends on the step take it too, `measure(m, d, k)`; with `steps`, these take the place of 0, 1,
-    2..., over and over.
+    Those of a structure that depends on the step take it too, `measure(m, d, k)`; with `steps`,
+    these take the place of 0, 1, 2..., over and over.
     """
     if structure.at_step is not None:
         return (
@@ -56,7 +59,11 @@ def array_functions(structure: Structure, steps: Sequence[int] = ()) -> tuple[Fu
 
     def measure(m: Array, d: Array) -> tuple[Array, Array, Array]:
         h, G, F, _ = structure.measure(m, d)
-        return np.array(np.broadcast_to(h, (len(m), structure.model.p))), full(G, len(m)), full(F, len(m))
+        return (
+            np.array(np.broadcast_to(h, (len(m), structure.model.p))),
+            full(G, len(m)),
+            full(F, len(m)),
+        )
 
     def predict(z: Array, p: Array) -> tuple[Array, Array]:
         tau, Theta = structure.predict(z, p)
@@ -66,11 +73,14 @@ def array_functions(structure: Structure, steps: Sequence[int] = ()) -> tuple[Fu
 
 
 def noiseless_functions(model: Model, steps: Sequence[int] = ()) -> tuple[Function, Function]:
-    """a(x) and b(x), the equations with the noises at their means: (N, n) -> (N, n) and (N, p); with the step as above."""
+    """a(x) and b(x), the equations with the noises at their means: (N, n) -> (N, n) and (N, p);
+    with the step as above."""
     a, b = compile_noiseless(model)
     if not model.timed:
         return a, b
-    return of_steps(lambda x, k: a(x, _taken(steps, k))), of_steps(lambda x, k: b(x, _taken(steps, k)))
+    return of_steps(lambda x, k: a(x, _taken(steps, k))), of_steps(
+        lambda x, k: b(x, _taken(steps, k))
+    )
 
 
 def _taken(steps: Sequence[int], k: int) -> int:
@@ -78,20 +88,27 @@ def _taken(steps: Sequence[int], k: int) -> int:
 
 
 def telling_steps(model: Model) -> list[int]:
-    """Steps at which the equations differ, in the order of time; where an input or a switch rests, a wrong step does not show."""
+    """Steps at which the equations differ, in the order of time; where an input or a switch rests,
+    a wrong step does not show."""
     state, meter = compile_model(model)
     x = model.prior.mean + np.sqrt(np.diagonal(model.prior.cov))
     v, w = (law.mean + 1.0 for law in (model.state_noise, model.meter_noise))
     found: dict[tuple[str, ...], int] = {}
     with np.errstate(all="ignore"):
         for k in range(int(min(TRIED, model.known.steps))):
-            found.setdefault(tuple(f"{value:.9g}" for value in (*state(x, v, k), *meter(x, w, k))), k)
+            found.setdefault(
+                tuple(f"{value:.9g}" for value in (*state(x, v, k), *meter(x, w, k))), k
+            )
     return list(found.values())
 
 
 def places(model: Model) -> list[Mapping[sp.Symbol, sp.Expr]]:
-    """Values of k and t at which formulas are compared: on both sides of every switch; none if there is no switch."""
-    interval, clocks = model.known.interval, [s for s in model.known.symbols if s.name not in model.known.inputs]
+    """Values of k and t at which formulas are compared: on both sides of every switch; none if
+    there is no switch."""
+    interval, clocks = (
+        model.known.interval,
+        [s for s in model.known.symbols if s.name not in model.known.inputs],
+    )
     equations = sp.Matrix([*model.state_equation, *model.meter_equation]).subs(model.values)
     borders = [one.lhs - one.rhs for one in equations.atoms(sp.core.relational.Relational)]
     borders += [one.args[0] for one in equations.atoms(sp.Heaviside, sp.sign, sp.Abs)]
@@ -101,7 +118,10 @@ def places(model: Model) -> list[Mapping[sp.Symbol, sp.Expr]]:
             if border.free_symbols == {clock}:
                 at = [sp.floor(root / length) for root in _roots(border, clock)]
                 steps |= {int(one) + d for one in at for d in (-1, 0, 1, 2) if one + d >= 0}
-    return [{s: sp.Integer(k) * (interval if s.name == "t" else 1) for s in clocks} for k in sorted(steps)]
+    return [
+        {s: sp.Integer(k) * (interval if s.name == "t" else 1) for s in clocks}
+        for k in sorted(steps)
+    ]
 
 
 def _roots(border: sp.Expr, clock: sp.Symbol) -> list[sp.Expr]:

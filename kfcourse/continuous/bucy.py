@@ -18,19 +18,23 @@ from kfcourse.symbolic.reading import (
 def extended_kalman_bucy(
     model: ContinuousModel, step: float, second_derivatives: bool = False, symmetrised: bool = False
 ) -> Filter:
-    """The extended Kalman filter in continuous time, as a filter of the means y_k over steps of length T.
+    """The extended Kalman filter in continuous time, as a filter of the means y_k over steps of
+    length T.
 
     dz/dt = f + K (y - S),                        K = D H^T 2 N^-1
     dD/dt = A D + D A^T + Q - K H D  [+ D W D],   W = U + H^T 2 N^-1 H
 
-    are integrated by Euler's scheme, except that the term -K H D is taken implicitly, so that no step is too long for it:
+    are integrated by Euler's scheme, except that the term -K H D is taken implicitly, so that no
+    step is too long for it:
 
         B  = (D^-1 + T H^T 2 N^-1 H)^-1
         z' = z + T (f + B H^T 2 N^-1 (y - S))
-        D' = (M + T A) B (M + T A)^T + T Q,      M = (I + T B V / 8)^-1 (I + T B W / 2),   V = T M[W B W]
+        D' = (M + T A) B (M + T A)^T + T Q,   M = (I + T B V / 8)^-1 (I + T B W / 2),
+        V = T M[W B W]
 
-    D' is never negative.  Without second derivatives M = I; with them W contains white noise of the size 1 / sqrt(T), so
-    (T B W)^2 is of the order T, and V makes Mean[M B M^T] = B to that order, as Ito's sense demands.
+    D' is never negative.  Without second derivatives M = I; with them W contains white noise of the
+    size 1 / sqrt(T), so (T B W)^2 is of the order T, and V makes Mean[M B M^T] = B to that order,
+    as Ito's sense demands.
 
     Parameters
     ----------
@@ -45,8 +49,9 @@ def extended_kalman_bucy(
     Returns
     -------
     Filter
-        For `run`, `compare`, and `predictions(filter, y)`, which gives z and D at the times 0, T, 2 T, ...
-        Its `model` is `to_discrete(model, step)`.  A run whose y has a NaN does without the missing components and without W.
+        For `run`, `compare`, and `predictions(filter, y)`, which gives z and D at the times 0, T, 2
+        T, ... Its `model` is `to_discrete(model, step)`.  A run whose y has a NaN does without the
+        missing components and without W.
 
     Raises
     ------
@@ -58,21 +63,31 @@ def extended_kalman_bucy(
     equations = filter_equations(model, second_derivatives)
     z, D, y = equations.z, equations.D, equations.y
     arguments = {"z": z, "D": D, "y": y}
-    linear = compiled(model, {"z": z}, {key: getattr(equations, key) for key in "fAQSH"}, ["z", "f", "S"])
+    linear = compiled(
+        model, {"z": z}, {key: getattr(equations, key) for key in "fAQSH"}, ["z", "f", "S"]
+    )
     W = equations.U - without_noise(equations.U, y, equations.S)
     intensity = exact_matrix(model.noise_density) / 2
     slopes = [W.diff(component) for component in y]  # W is linear in y
-    V = sum((intensity[i, j] * a * D * b for i, a in enumerate(slopes) for j, b in enumerate(slopes)), sp.zeros(*D.shape))
+    V = sum(
+        (intensity[i, j] * a * D * b for i, a in enumerate(slopes) for j, b in enumerate(slopes)),
+        sp.zeros(*D.shape),
+    )
     added = sp.zeros(len(equations.state), 1)
     if symmetrised:
         added = symmetrised_drift(equations.rates, equations.state, list(y), intensity)
     by_state = dict(zip(equations.state, added, strict=True))
     outputs = {"W": W, "V": V, "dz": z.applyfunc(by_state.get), "dD": D.applyfunc(by_state.get)}
-    second = compiled(model, arguments, outputs, ["z", "y", "dz"]) if second_derivatives or symmetrised else None
+    second = (
+        compiled(model, arguments, outputs, ["z", "y", "dz"])
+        if second_derivatives or symmetrised
+        else None
+    )
     identity, R = np.eye(model.n), model.noise_density / (2 * step)
 
     def step_forward(state: State, y: Array) -> State:
-        with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is reported below
+        # what becomes infinite is reported below
+        with np.errstate(over="ignore", invalid="ignore"):
             z, D = state.predicted
             t = state.step * step
             f, A, Q, S, H = linear(t, z)
@@ -108,7 +123,12 @@ def _check_law(name: str, k: int, step: float, law: Gaussian, may_be_negative: b
         lost = np.asarray(np.linalg.eigvalsh(law.cov).min(axis=-1) < 0)
     if lost.any():
         raise NotFinite(
-            f"step {k}, time {(k + 1) * step:g}: {name} became infinite{' or negative' if may_be_negative else ''} in "
+            f"step {k}, time {(k + 1) * step:g}: {name} became "
+            f"infinite{' or negative' if may_be_negative else ''} in "
             f"{np.count_nonzero(lost)} of {len(law.mean)} runs; take a smaller step than {step:g}"
-            + (", and if that does not help, leave out the second derivatives" if "-" in name[7:] else "")
+            + (
+                ", and if that does not help, leave out the second derivatives"
+                if "-" in name[7:]
+                else ""
+            )
         )

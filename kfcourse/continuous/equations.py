@@ -13,28 +13,38 @@ from kfcourse.symbolic.reading import (
 )
 
 
-def log_likelihood_rate(signal: sp.MatrixBase, y: sp.MatrixBase, noise_density: sp.MatrixBase) -> sp.Expr:
-    """F(x, t) = 2 S^T N^-1 (y - S / 2), what the log-likelihood gains in unit time: (p, 1), (p, 1), (p, p) -> scalar."""
+def log_likelihood_rate(
+    signal: sp.MatrixBase, y: sp.MatrixBase, noise_density: sp.MatrixBase
+) -> sp.Expr:
+    """F(x, t) = 2 S^T N^-1 (y - S / 2), what the log-likelihood gains in unit time: (p, 1), (p, 1),
+    (p, p) -> scalar."""
     return (2 * signal.T * noise_density.inv() * (y - signal / 2))[0]
 
 
 def symmetrised_drift(
-    rates: sp.MatrixBase, state: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], intensity: sp.MatrixBase
+    rates: sp.MatrixBase,
+    state: Sequence[sp.Symbol],
+    noise: Sequence[sp.Symbol],
+    intensity: sp.MatrixBase,
 ) -> sp.ImmutableMatrix:
-    """What is added to ds/dt = rates(s, noise) in Ito's sense to give the same in the symmetrised (Stratonovich) sense, (n, 1).
+    """What is added to ds/dt = rates(s, noise) in Ito's sense to give the same in the symmetrised
+    (Stratonovich) sense, (n, 1).
 
     1/2 sum_lm q_lm db_l/ds b_m    q the intensity, b_l the derivative of the rates by noise l
     g g' S_xi / 4                  of g(x) xi
     """
     b, q = rates.jacobian(sp.Matrix(noise)), range(len(noise))
-    terms = [intensity[i, j] / 2 * b.col(i).jacobian(sp.Matrix(state)) * b.col(j) for i in q for j in q]
+    terms = [
+        intensity[i, j] / 2 * b.col(i).jacobian(sp.Matrix(state)) * b.col(j) for i in q for j in q
+    ]
     return sp.ImmutableMatrix(sum(terms, sp.zeros(len(rates), 1)))
 
 
 class FilterEquations(NamedTuple):
     """The extended Kalman-Bucy filter in formulas, parameters as symbols.
 
-    dz/dt = f + D u,     dD/dt = A D + D A^T + Q + D U D,     u = (dF/dx)^T,  U = d^2 F / dx^2  at x = z
+    dz/dt = f + D u,     dD/dt = A D + D A^T + Q + D U D,     u = (dF/dx)^T,  U = d^2 F / dx^2  at x
+    = z
 
     Attributes
     ----------
@@ -85,16 +95,23 @@ def filter_equations(model: ContinuousModel, second_derivatives: bool = True) ->
     """
     n = model.n
     z = sp.ImmutableMatrix([model.fresh(name) for name in numbered("z", n)])
-    D = sp.ImmutableMatrix(n, n, lambda i, j: model.fresh("D" if n == 1 else f"D{min(i, j) + 1}{max(i, j) + 1}"))
+    D = sp.ImmutableMatrix(
+        n, n, lambda i, j: model.fresh("D" if n == 1 else f"D{min(i, j) + 1}{max(i, j) + 1}")
+    )
     y = sp.ImmutableMatrix([model.fresh(name) for name in numbered("y", model.p)])
     at = dict(zip(model.x, z, strict=True))
-    f, g, S = (sp.ImmutableMatrix(matrix.subs(at, simultaneous=True)) for matrix in (model.drift, model.diffusion, model.signal))
+    f, g, S = (
+        sp.ImmutableMatrix(matrix.subs(at, simultaneous=True))
+        for matrix in (model.drift, model.diffusion, model.signal)
+    )
     F = log_likelihood_rate(S, y, exact_matrix(model.noise_density))
     U = sp.ImmutableMatrix(sp.hessian(F, list(z)))
     if not second_derivatives:
         U = without_noise(U, y, S)
     Q = g * exact_matrix(model.spectral_density) * g.T / 2
-    return FilterEquations(z, D, y, f, f.jacobian(z), Q, S, S.jacobian(z), F, sp.ImmutableMatrix([F]).jacobian(z).T, U)
+    return FilterEquations(
+        z, D, y, f, f.jacobian(z), Q, S, S.jacobian(z), F, sp.ImmutableMatrix([F]).jacobian(z).T, U
+    )
 
 
 def without_noise(U: sp.MatrixBase, y: sp.MatrixBase, S: sp.MatrixBase) -> sp.ImmutableMatrix:

@@ -1,14 +1,18 @@
 r"""Moment equations between two measurements, derived and integrated.
 
-    dz/dt = M_N[a],    dp/dt = A p + p A^T + M_N[B B^T],    A = dM_N[a] / dz,        M_N: the mean over x ~ N(z, p)
+    dz/dt = M_N[a],   dp/dt = A p + p A^T + M_N[B B^T],   A = dM_N[a] / dz,
+    M_N: the mean over x ~ N(z, p)
 
-Exact would be dp/dt = Cov(x, a) + Cov(a, x) + M[B B^T]; for a normal law Cov(a, x) = A p (Stein's lemma).  Instead of p its two
-parts are integrated, of what was known at the beginning and of what came since:
+Exact would be dp/dt = Cov(x, a) + Cov(a, x) + M[B B^T]; for a normal law Cov(a, x) = A p (Stein's
+lemma).  Instead of p its two parts are integrated, of what was known at the beginning and of what
+came since:
 
-    p(t) = F p(t_k) F^T + Q,    dF/dt = A F,    dQ/dt = A Q + Q A^T + M_N[B B^T],    F = I, Q = 0 at t_k
+    p(t) = F p(t_k) F^T + Q,   dF/dt = A F,   dQ/dt = A Q + Q A^T + M_N[B B^T],
+    F = I, Q = 0 at t_k
 
-Neither can become negative, and F and Q are what a smoother needs.  All trajectories of an ensemble share the steps of one
-embedded pair (Dormand and Prince's, of order 5); the worst of them decides how long a step is.
+Neither can become negative, and F and Q are what a smoother needs.  All trajectories of an ensemble
+share the steps of one embedded pair (Dormand and Prince's, of order 5); the worst of them decides
+how long a step is.
 """
 
 from __future__ import annotations
@@ -33,12 +37,14 @@ from kfcourse.symbolic.structure import Structure, gaussian, gaussian_symbols, l
 MOST_STEPS = 10_000  # between two measurements: some seconds
 NEAR = 1e-3  # of a mean that has no variance: a part of it stands for the standard deviation
 
-Rates: TypeAlias = Callable[[Array, Vectors, Matrices], tuple[Array, ...]]  # (known, z, p) -> M[a], A, M[B B^T]
+# (known, z, p) -> M[a], A, M[B B^T]
+Rates: TypeAlias = Callable[[Array, Vectors, Matrices], tuple[Array, ...]]
 Moved: TypeAlias = tuple[Vectors, Matrices, Matrices]  # tau, F, Q
 
 
 class MomentEquations(NamedTuple):
-    """The moment equations in formulas, parameters as symbols: z (n, 1), p (n, n); M[a], A and M[B B^T] at N(z, p)."""
+    """The moment equations in formulas, parameters as symbols: z (n, 1), p (n, n); M[a], A and M[B
+    B^T] at N(z, p)."""
 
     z: sp.ImmutableMatrix
     p: sp.ImmutableMatrix
@@ -53,8 +59,11 @@ class MomentEquations(NamedTuple):
         return self.drift, (slope + slope.T + self.intensity).applyfunc(sp.expand)
 
 
-def moment_equations(model: Model, approximation: Callable[[Model], Structure] = gaussian) -> MomentEquations:
-    """Derive them: `gaussian`, with exact means over the normal law, or `linearised`, with those at its mean.
+def moment_equations(
+    model: Model, approximation: Callable[[Model], Structure] = gaussian
+) -> MomentEquations:
+    """Derive them: `gaussian`, with exact means over the normal law, or `linearised`, with those at
+    its mean.
 
     Raises
     ------
@@ -65,12 +74,18 @@ def moment_equations(model: Model, approximation: Callable[[Model], Structure] =
     drift, B = model.between.drift, model.between.diffusion
     if approximation is linearised:
         seen = linearised(_seen(model))
-        means = [*sp.Matrix([seen["h"]]).subs(dict(zip(gaussian_symbols(model, "m", "d")[0], z, strict=True)), simultaneous=True)]
+        means = [
+            *sp.Matrix([seen["h"]]).subs(
+                dict(zip(gaussian_symbols(model, "m", "d")[0], z, strict=True)), simultaneous=True
+            )
+        ]
     else:
         law = GaussianMoments(model.x, list(z), p)
         means = [law.mean_of(formula) for formula in (*drift, *(B * B.T))]
     tau = sp.ImmutableMatrix(means[: model.n])
-    return MomentEquations(z, p, tau, tau.jacobian(z), sp.ImmutableMatrix(model.n, model.n, means[model.n :]))
+    return MomentEquations(
+        z, p, tau, tau.jacobian(z), sp.ImmutableMatrix(model.n, model.n, means[model.n :])
+    )
 
 
 class _Now(Known):
@@ -81,25 +96,38 @@ class _Now(Known):
 
 
 def _seen(model: Model) -> Model:
-    """A model whose meter is (a, B B^T): of such a meter every structure knows the mean, and its slope by x."""
+    """A model whose meter is (a, B B^T): of such a meter every structure knows the mean, and its
+    slope by x."""
     rates = model.between
     seen = sp.ImmutableMatrix([*rates.drift, *(rates.diffusion * rates.diffusion.T)])
     known = _Now(**vars(model.known))
-    return replace(at_rest(model), meter_equation=seen, angles=model.angles._replace(y=()), known=known)
+    return replace(
+        at_rest(model), meter_equation=seen, angles=model.angles._replace(y=()), known=known
+    )
 
 
 def at_rest(model: Model) -> Model:
     """The model with its meter, and a state that stays where it is."""
     still = Gaussian(np.zeros(1), np.eye(1))
-    return replace(model, between=None, state_equation=sp.ImmutableMatrix(model.x), v=model.v[:1], state_noise=still)
+    return replace(
+        model,
+        between=None,
+        state_equation=sp.ImmutableMatrix(model.x),
+        v=model.v[:1],
+        state_noise=still,
+    )
 
 
 def rates_of(model: Model, approximation: Callable[[Model], Structure]) -> Rates:
-    """The right sides as a function of arrays; of sigma points by the slopes of their regression."""
+    """The right sides as a function of arrays; of sigma points by the slopes of their
+    regression."""
     n = model.n
     if approximation in (gaussian, linearised):
         z, p, *rates = moment_equations(model, approximation)
-        outputs = {name: part.subs(model.values) for name, part in zip(("drift", "A", "Q"), rates, strict=True)}
+        outputs = {
+            name: part.subs(model.values)
+            for name, part in zip(("drift", "A", "Q"), rates, strict=True)
+        }
         arguments = {"known": sp.Matrix(model.known.symbols), "z": z, "p": p}
         return compile_function("rates", arguments, outputs, ["known", "z", "drift"]).function
     structure = approximation(_seen(model))
@@ -111,23 +139,37 @@ def rates_of(model: Model, approximation: Callable[[Model], Structure]) -> Rates
     return by_points
 
 
-def flow_of(rates: Rates, model: Model, accuracy: float) -> Callable[[Callable[[float], Array], float, Vectors, Matrices], Moved]:
-    """(what is known after a time, span, z, p) -> tau, F, Q at its end; exact by the matrix exponential where linear."""
+def flow_of(
+    rates: Rates, model: Model, accuracy: float
+) -> Callable[[Callable[[float], Array], float, Vectors, Matrices], Moved]:
+    """(what is known after a time, span, z, p) -> tau, F, Q at its end; exact by the matrix
+    exponential where linear."""
     parts = model.between
     slope = parts.drift.jacobian(sp.Matrix(model.x))
     varying = (*model.x, *(s for s in model.known.symbols if s.name == "t"))
-    if not (slope.has(*varying) or parts.diffusion.has(*varying) or parts.drift.subs(dict.fromkeys(model.x, 0)).has(*varying)):
+    if not (
+        slope.has(*varying)
+        or parts.diffusion.has(*varying)
+        or parts.drift.subs(dict.fromkeys(model.x, 0)).has(*varying)
+    ):
         anywhere = Gaussian(np.zeros(model.n), np.eye(model.n))
         return lambda now, span, z, p: _linear(rates(now(0.0), *anywhere), span, z)
     return lambda now, span, z, p: _integrated(rates, now, span, z, p, accuracy)
 
 
 def _linear(rates: tuple[Array, ...], span: float, z: Vectors) -> Moved:
-    """dz/dt = A z + c: Van Loan's exponential over a short step, doubled until the span is reached."""
+    """dz/dt = A z + c: Van Loan's exponential over a short step, doubled until the span is
+    reached."""
     c, A, Theta = rates
     n = len(c)
     doublings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=1).max() * span, 1.0)))))
-    block = np.block([[A, Theta, c[:, None]], [np.zeros((n, n)), -A.T, np.zeros((n, 1))], [np.zeros((1, 2 * n + 1))]])
+    block = np.block(
+        [
+            [A, Theta, c[:, None]],
+            [np.zeros((n, n)), -A.T, np.zeros((n, 1))],
+            [np.zeros((1, 2 * n + 1))],
+        ]
+    )
     whole = expm(block * span / 2**doublings)
     F, shift = whole[:n, :n], whole[:n, -1]
     Q = whole[:n, n : 2 * n] @ F.T
@@ -136,13 +178,24 @@ def _linear(rates: tuple[Array, ...], span: float, z: Vectors) -> Moved:
     return z @ F.T + shift, F, Q
 
 
-def _integrated(rates: Rates, now: Callable[[float], Array], span: float, z: Vectors, p: Matrices, accuracy: float) -> Moved:
+def _integrated(
+    rates: Rates,
+    now: Callable[[float], Array],
+    span: float,
+    z: Vectors,
+    p: Matrices,
+    accuracy: float,
+) -> Moved:
     lead, n = z.shape[:-1], z.shape[-1]
     square = (*lead, n, n)
     before = np.sqrt(np.abs(np.diagonal(p, axis1=-2, axis2=-1)))[..., None, :]
 
     def unpacked(state: Array) -> Moved:
-        return state[..., :n], state[..., n : n + n * n].reshape(square), state[..., n + n * n :].reshape(square)
+        return (
+            state[..., :n],
+            state[..., n : n + n * n].reshape(square),
+            state[..., n + n * n :].reshape(square),
+        )
 
     def packed(mean: Array, F: Array, Q: Array) -> Array:
         state = np.empty((*lead, n + 2 * n * n))
@@ -162,15 +215,26 @@ def _integrated(rates: Rates, now: Callable[[float], Array], span: float, z: Vec
     def error(step: Array, state: Array) -> float:
         """The largest of a step, in standard deviations."""
         (mean, F, Q), (value, *law) = unpacked(step), unpacked(state)
-        sd = np.sqrt(np.abs(np.diagonal(covariance(*law), axis1=-2, axis2=-1))) + NEAR * np.abs(value) + np.finfo(float).tiny
-        of_F, of_Q = np.abs(F) * before / sd[..., None], np.abs(Q) / sd[..., None] / sd[..., None, :]
+        sd = (
+            np.sqrt(np.abs(np.diagonal(covariance(*law), axis1=-2, axis2=-1)))
+            + NEAR * np.abs(value)
+            + np.finfo(float).tiny
+        )
+        of_F, of_Q = (
+            np.abs(F) * before / sd[..., None],
+            np.abs(Q) / sd[..., None] / sd[..., None, :],
+        )
         return float(max((np.abs(mean) / sd).max(), of_F.max(), of_Q.max()))
 
     return unpacked(_run(rate, error, packed(z, np.eye(n), np.zeros((n, n))), span, accuracy))
 
 
 def _run(
-    rate: Callable[[float, Array], Array], error: Callable[[Array, Array], float], state: Array, span: float, accuracy: float
+    rate: Callable[[float, Array], Array],
+    error: Callable[[Array, Array], float],
+    state: Array,
+    span: float,
+    accuracy: float,
 ) -> Array:
     """The state after the span, by steps whose error stays below the accuracy."""
     s, h, slopes = 0.0, span, np.empty((7, state.size))
@@ -194,10 +258,13 @@ def _run(
             h = min(h * min(max(longer, 0.2), 10.0), span - s)
             if s + h == s:
                 raise NotFinite(
-                    f"the moments become infinite {s:g} after an instant, and the next is {span:g} after it: the drift outgrows "
+                    f"the moments become infinite {s:g} after an instant, and the next is "
+                    f"{span:g} after it: the drift outgrows "
                     "the state there, as x**3 does; check its sign, or measure more often"
                 )
     raise NotFinite(
-        f"the moment equations are stiff: {MOST_STEPS} steps reach {s:g} of the {span:g} between two instants, and the rest "
-        "would take minutes; replace the fastest component by its steady state, or ask for less `accuracy`"
+        f"the moment equations are stiff: {MOST_STEPS} steps reach {s:g} of the {span:g} between "
+        f"two instants, and the rest "
+        "would take minutes; replace the fastest component by its steady state, or ask for less "
+        "`accuracy`"
     )

@@ -74,7 +74,8 @@ class ContinuousModel:
         Parameters
         ----------
         drift, signal : str, sympy expression, or a list of them
-            f(x, t) and S(x, t).  A single drift formula is a scalar model in x; lists use x1, x2, ... unless `symbols` names
+            f(x, t) and S(x, t).  A single drift formula is a scalar model in x; lists use x1, x2,
+            ... unless `symbols` names
             them.  t is the time from the start on, unless a parameter or a component is called so.
         diffusion : str, sympy expression, or a list of rows
             g(x, t), one row for each state component, one column for each noise.
@@ -101,28 +102,47 @@ class ContinuousModel:
         ContinuousModel(dx/dt = -x + xi*(1 + exp(-t)) + cos(t), y = x + n)
         """
         given = table("parameters", parameters)
-        values = {checked_name(name): exact_number(f"parameter {name}", value) for name, value in given.items()}
-        f, S = (formula_list(what, _plain(formulas)) for what, formulas in (("drift", drift), ("signal", signal)))
+        values = {
+            checked_name(name): exact_number(f"parameter {name}", value)
+            for name, value in given.items()
+        }
+        f, S = (
+            formula_list(what, _plain(formulas))
+            for what, formulas in (("drift", drift), ("signal", signal))
+        )
         g = diffusion_rows(diffusion)
         n, noises = len(f), len(g[0])
-        names = [*([symbols] if isinstance(symbols, str) else symbols or (["x"] if n == 1 else [f"x{i + 1}" for i in range(n)]))]
+        names = [
+            *(
+                [symbols]
+                if isinstance(symbols, str)
+                else symbols or (["x"] if n == 1 else [f"x{i + 1}" for i in range(n)])
+            )
+        ]
         if len(names) != n or len(g) != n:
             raise ModelError(
-                f"{n} drift formula(s), {len(g)} row(s) of diffusion and the state symbols {names}: one each is needed"
+                f"{n} drift formula(s), {len(g)} row(s) of diffusion and the state symbols "
+                f"{names}: one each is needed"
             )
         twice = sorted({name for name in names if names.count(name) > 1 or name in values})
         if twice:
-            raise ModelError(f"{', '.join(twice)} named twice: state and parameters need different names")
+            raise ModelError(
+                f"{', '.join(twice)} named twice: state and parameters need different names"
+            )
         x = tuple(symbol(checked_name(name)) for name in names)
         known = {"t": symbol("t")} | {name: symbol(name) for name in values} | by_name(x)
         N = law("noise_density", {"variance": noise_density}, len(S)).cov
-        if np.linalg.eigvalsh(N).min() <= 1e-12 * np.linalg.eigvalsh(N).max():  # rounding of eigvalsh
+        # rounding of eigvalsh
+        if np.linalg.eigvalsh(N).min() <= 1e-12 * np.linalg.eigvalsh(N).max():
             raise ModelError(
-                f"`noise_density` must be positive definite, got {N.tolist()}: without noise, y(t) would give S(x) exactly"
+                f"`noise_density` must be positive definite, got {N.tolist()}: without noise, "
+                f"y(t) would give S(x) exactly"
             )
         model = cls(
             sp.ImmutableMatrix([read(formula, known, "drift") for formula in f]),
-            sp.ImmutableMatrix([[read(formula, known, "diffusion") for formula in row] for row in g]),
+            sp.ImmutableMatrix(
+                [[read(formula, known, "diffusion") for formula in row] for row in g]
+            ),
             sp.ImmutableMatrix([read(formula, known, "signal") for formula in S]),
             x,
             values,
@@ -130,7 +150,8 @@ class ContinuousModel:
             law("spectral_density", {"variance": spectral_density}, noises).cov,
             N,
         )
-        to_discrete(model, 1.0)  # its checks are this model's too: real and finite, and the signal depends on the state
+        # its checks are this model's too: real and finite, and the signal depends on the state
+        to_discrete(model, 1.0)
         return model
 
     @property
@@ -153,7 +174,12 @@ class ContinuousModel:
         """t, if the formulas contain it."""
         t = symbol("t")
         named = t.name in self.parameters or t in self.x
-        return t if not named and any(matrix.has(t) for matrix in (self.drift, self.diffusion, self.signal)) else None
+        return (
+            t
+            if not named
+            and any(matrix.has(t) for matrix in (self.drift, self.diffusion, self.signal))
+            else None
+        )
 
     def fresh(self, name: str) -> sp.Symbol:
         """A symbol of that name, with underscores if the model uses it already."""
@@ -165,7 +191,9 @@ class ContinuousModel:
         xi = [symbol(name) for name in numbered("xi", self.diffusion.cols)]
         rates = self.drift + self.diffusion * sp.Matrix(xi)
         rows = [f"d{x}/dt = {rate}" for x, rate in zip(self.x, rates, strict=True)]
-        rows += [f"{y} = {S} + n{y[1:]}" for y, S in zip(numbered("y", self.p), self.signal, strict=True)]
+        rows += [
+            f"{y} = {S} + n{y[1:]}" for y, S in zip(numbered("y", self.p), self.signal, strict=True)
+        ]
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
         return f"ContinuousModel({', '.join(rows)}{'; ' if values else ''}{values})"
 
@@ -183,12 +211,20 @@ def diffusion_rows(diffusion: Any) -> list[list[Formula]]:
     rows = diffusion.tolist() if isinstance(diffusion, sp.MatrixBase) else diffusion
     if isinstance(rows, str | sp.Expr):
         return [[rows]]
-    if not isinstance(rows, list | tuple) or not rows or not all(isinstance(row, list | tuple) for row in rows):
-        raise ModelError(f"`diffusion` must be one formula or a list of rows such as [['0'], ['s']], got {diffusion!r}")
+    if (
+        not isinstance(rows, list | tuple)
+        or not rows
+        or not all(isinstance(row, list | tuple) for row in rows)
+    ):
+        raise ModelError(
+            f"`diffusion` must be one formula or a list of rows such as [['0'], ['s']], got "
+            f"{diffusion!r}"
+        )
     found = [formula_list("diffusion", list(row)) for row in rows]
     if len({len(row) for row in found}) > 1:
         raise ModelError(
-            f"`diffusion`: rows of different lengths {[len(row) for row in found]}; write 0 where a noise does not enter"
+            f"`diffusion`: rows of different lengths {[len(row) for row in found]}; write 0 where "
+            f"a noise does not enter"
         )
     return found
 
@@ -196,9 +232,11 @@ def diffusion_rows(diffusion: Any) -> list[list[Formula]]:
 def to_discrete(model: ContinuousModel, step: float) -> Model:
     """The discrete model whose limit for T -> 0 the continuous one is.
 
-    x_{k+1} = x_k + T f(x_k) + T g(x_k) v_k,  v ~ N(0, S_xi / (2 T));    y_k = S(x_k) + w_k,  w ~ N(0, N / (2 T))
+    x_{k+1} = x_k + T f(x_k) + T g(x_k) v_k,  v ~ N(0, S_xi / (2 T));    y_k = S(x_k) + w_k,  w ~
+    N(0, N / (2 T))
 
-    f, g and S at the time t_k = T k.  Both noises are means of white noise over the step.  All discrete filters run on it.
+    f, g and S at the time t_k = T k.  Both noises are means of white noise over the step.  All
+    discrete filters run on it.
     """
     expect(model, ContinuousModel, "to_discrete")
     check_step(step)
@@ -209,7 +247,11 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
         list(sp.Matrix(model.x) + T * (model.drift + model.diffusion * sp.Matrix(v))),
         list(model.signal + sp.Matrix(w)),
         model.parameters,
-        symbols={"x": [s.name for s in model.x], "v": [s.name for s in v], "w": [s.name for s in w]},
+        symbols={
+            "x": [s.name for s in model.x],
+            "v": [s.name for s in v],
+            "w": [s.name for s in w],
+        },
         prior={"mean": model.prior.mean, "variance": model.prior.cov},
         state_noise={"variance": model.spectral_density / (2 * step)},
         meter_noise={"variance": model.noise_density / (2 * step)},
@@ -221,11 +263,17 @@ def compiled(
     model: ContinuousModel, arguments: dict[str, Any], outputs: dict[str, Any], vectors: list[str]
 ) -> Callable[..., Any]:
     """The generated function of the time and these arguments."""
-    numeric = {name: sp.ImmutableMatrix(matrix.subs(model.values)) for name, matrix in outputs.items()}
+    numeric = {
+        name: sp.ImmutableMatrix(matrix.subs(model.values)) for name, matrix in outputs.items()
+    }
     if model.time is not None:
         arguments = {**arguments, "t": sp.Matrix([model.time])}
     function = compile_function("continuous", arguments, numeric, [*vectors, "t"]).function
-    return (lambda t, *arrays: function(*arrays)) if model.time is None else lambda t, *arrays: function(*arrays, np.array([t]))
+    return (
+        (lambda t, *arrays: function(*arrays))
+        if model.time is None
+        else lambda t, *arrays: function(*arrays, np.array([t]))
+    )
 
 
 def check_step(step: float) -> None:

@@ -27,14 +27,20 @@ class Path(NamedTuple):
 
 
 def simulate(
-    model: ContinuousModel, step: float, steps: int, runs: int, seed: int | np.random.Generator, substeps: int = 1
+    model: ContinuousModel,
+    step: float,
+    steps: int,
+    runs: int,
+    seed: int | np.random.Generator,
+    substeps: int = 1,
 ) -> Path:
     """Trajectories by the Euler-Maruyama scheme with the step T / substeps.
 
-    x' = x + dt f(x, t) + g(x, t) N(0, S_xi dt / 2),     y_k = 1/dt Integral S(x, t) dt + N(0, N / (2 dt))
+    x' = x + dt f(x, t) + g(x, t) N(0, S_xi dt / 2),     y_k = 1/dt Integral S(x, t) dt + N(0, N /
+    (2 dt))
 
-    The error of a trajectory is of the order dt if g is constant, and sqrt(dt) if g depends on x; that of its moments is of the
-    order dt in both cases.
+    The error of a trajectory is of the order dt if g is constant, and sqrt(dt) if g depends on x;
+    that of its moments is of the order dt in both cases.
 
     Raises
     ------
@@ -49,12 +55,16 @@ def simulate(
     rng, dt = np.random.default_rng(seed), step / substeps
     formulas = {"f": model.drift, "g": model.diffusion, "S": model.signal}
     equations = compiled(model, {"x": sp.Matrix(model.x)}, formulas, ["x", "f", "S"])
-    xi_root, n_root = square_root(model.spectral_density * dt / 2), square_root(model.noise_density / (2 * dt))
+    xi_root, n_root = (
+        square_root(model.spectral_density * dt / 2),
+        square_root(model.noise_density / (2 * dt)),
+    )
     x = np.empty((steps + 1, runs, model.n))
     y = np.zeros((steps, runs, model.p))
     now = model.prior.mean + rng.standard_normal((runs, model.n)) @ square_root(model.prior.cov).T
     x[0] = now
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what becomes infinite is reported below
+    # what becomes infinite is reported below
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for k in range(steps):
             for part in range(substeps):
                 f, g, S = equations((k + part / substeps) * step, now)
@@ -63,14 +73,27 @@ def simulate(
             x[k + 1] = now
             if not (np.isfinite(now).all() and np.isfinite(y[k]).all()):
                 raise NotFinite(
-                    f"step {k}, time {(k + 1) * step:g}: a trajectory became infinite; check the model, or use more substeps"
+                    f"step {k}, time {(k + 1) * step:g}: a trajectory became infinite; check the "
+                    f"model, or use more substeps"
                 )
     return Path(step, x, y)
 
 
 def coarsen(path: Path, factor: int) -> Path:
-    """The same trajectories seen with a step `factor` times as long: every factor-th state, means of the measurements."""
+    """The same trajectories seen with a step `factor` times as long: every factor-th state, means
+    of the measurements."""
     steps = len(path.y)
-    if isinstance(factor, bool) or not isinstance(factor, int | np.integer) or factor < 1 or steps % factor:
-        raise ValueError(f"the factor must be a whole number that divides the {steps} steps, got {factor!r}")
-    return Path(path.step * factor, path.x[::factor], path.y.reshape(steps // factor, factor, *path.y.shape[1:]).mean(axis=1))
+    if (
+        isinstance(factor, bool)
+        or not isinstance(factor, int | np.integer)
+        or factor < 1
+        or steps % factor
+    ):
+        raise ValueError(
+            f"the factor must be a whole number that divides the {steps} steps, got {factor!r}"
+        )
+    return Path(
+        path.step * factor,
+        path.x[::factor],
+        path.y.reshape(steps // factor, factor, *path.y.shape[1:]).mean(axis=1),
+    )

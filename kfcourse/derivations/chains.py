@@ -1,8 +1,9 @@
 """The text of a whole derivation: headings that say what letters mean, and chains of lines.
 
-variant 53                                  whose structural functions and parameters the letters are
-linearised                                  tau, Theta, h, G, F are those of the tangent; otherwise the exact ones
-x ~ N(m, d)                                 letters of the law that means are over
+variant 53                                  whose structural functions and parameters the letters
+are
+linearised                                  tau, Theta, h, G, F are those of the tangent; otherwise
+the exact ones x ~ N(m, d)                                 letters of the law that means are over
 positive c, g                               letters that are positive; variances are without saying
 letters S, q                                more letters that may be used
 
@@ -54,7 +55,9 @@ class Chain:
     links: list[Typed] = field(default_factory=list)
 
 
-def read_chains(text: str, find: FindModel | None, setting: Setting | None = None) -> Iterator[Chain]:
+def read_chains(
+    text: str, find: FindModel | None, setting: Setting | None = None
+) -> Iterator[Chain]:
     """The chains of a text.
 
     Parameters
@@ -73,7 +76,9 @@ def read_chains(text: str, find: FindModel | None, setting: Setting | None = Non
     setting = Setting() if setting is None else setting
     lines = text.splitlines()
     if len(lines) > MOST_LINES:
-        raise DerivationError(f"the derivation has {len(lines)} lines; at most {MOST_LINES} are checked: split it up")
+        raise DerivationError(
+            f"the derivation has {len(lines)} lines; at most {MOST_LINES} are checked: split it up"
+        )
     chain: Chain | None = None
     for number, line in enumerate(lines, 1):
         line = line.partition("#")[0].rstrip()
@@ -92,7 +97,8 @@ def read_chains(text: str, find: FindModel | None, setting: Setting | None = Non
             chain = Chain(setting)
         elif chain is None:
             raise DerivationError(
-                f"line {number}: {line.strip()[:60]!r} goes on, but nothing stands above it; begin with a name, as in F = ..."
+                f"line {number}: {line.strip()[:60]!r} goes on, but nothing stands above it; "
+                f"begin with a name, as in F = ..."
             )
         else:
             pieces = pieces[1:]
@@ -118,7 +124,9 @@ def _heading(line: str, number: int, setting: Setting, find: FindModel | None) -
             raise DerivationError(f"line {number}: the model is given: leave out {line[:60]!r}")
         return of_model(find(rest.strip()), setting.kind)
     if line in KINDS:
-        return replace(setting, kind=line) if setting.model is None else of_model(setting.model, line)
+        return (
+            replace(setting, kind=line) if setting.model is None else of_model(setting.model, line)
+        )
     if found := re.fullmatch(r"x\s*~\s*N\s*\(\s*(\w+)\s*,\s*(\w+)\s*\)", line):
         return setting.at(*(_name(one, number) for one in found.groups()))
     if word in ("positive", "letters") and rest.strip():
@@ -127,7 +135,8 @@ def _heading(line: str, number: int, setting: Setting, find: FindModel | None) -
             return replace(setting, positive=setting.positive | names)
         return setting if setting.known is None else replace(setting, known=setting.known | names)
     raise DerivationError(
-        f"line {number}: {line[:60]!r} has no =, and is no heading; headings are: variant 53, linearised, gaussian, x ~ N(m, d), "
+        f"line {number}: {line[:60]!r} has no =, and is no heading; headings are: variant 53, "
+        f"linearised, gaussian, x ~ N(m, d), "
         "positive c, g, letters S, q"
     )
 

@@ -10,11 +10,13 @@ from kfcourse.derivations.values import ROUNDING, Values, agree
 
 EQUAL, DIFFERENT, IF_POSITIVE, NO_VALUE = "equal", "different", "equal if positive", "no value"
 FEWEST = 4  # points at which both have values
-CLEAR = 1e-4  # of a value: what its rounding may be, that it can be compared; tan(1e16) has no value
+# of a value: what its rounding may be, that it can be compared; tan(1e16) has no value
+CLEAR = 1e-4
 
 
 def compare(setting: Setting, first: Node, second: Node) -> str:
-    """Whether two trees are equal: "equal", "different", "equal if positive" letters are meant, or "no value".
+    """Whether two trees are equal: "equal", "different", "equal if positive" letters are meant, or
+    "no value".
 
     Raises
     ------
@@ -23,12 +25,18 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
     """
     values = Values(setting, [first, second])
     pairs = values.sized(first), values.sized(second)
-    defined = np.array([np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value))) for value, size in pairs])
+    defined = np.array(
+        [
+            np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value)))
+            for value, size in pairs
+        ]
+    )
     positive = np.arange(values.points) < values.points / 3
     same = agree(*pairs)
     if (defined.all(axis=0) & positive).sum() < FEWEST:
         return NO_VALUE
     if not same[defined.all(axis=0) & positive].all():
         return DIFFERENT
-    # Where only one side has a value, as log(c^2) has and 2 log(c) has not, they are equal for positive letters only.
+    # Where only one side has a value, as log(c^2) has and 2 log(c) has not, they are equal for
+    # positive letters only.
     return EQUAL if same[defined.any(axis=0)].all() else IF_POSITIVE

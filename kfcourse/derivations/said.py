@@ -1,4 +1,5 @@
-"""What is said of a slip: the kind and the term, and which rule the right step uses; never what would be right."""
+"""What is said of a slip: the kind and the term, and which rule the right step uses; never what
+would be right."""
 
 from __future__ import annotations
 
@@ -9,13 +10,18 @@ from kfcourse.derivations.slips import Slip, named, term_path
 from kfcourse.derivations.terms import CALL, MEAN, POWER, SUM, Node, at, letters, walk, written
 
 RULES = {
-    "moments": "Moments of a normal law: M[x^(n+1)] = m M[x^n] + n d M[x^(n-1)] for x ~ N(m, d), from M[1] = 1 and M[x] = m.",
-    "noise": "A noise is independent of the state and of the other noises, with M[w] = 0 and M[w^2] = 1.",
+    "moments": "Moments of a normal law: M[x^(n+1)] = m M[x^n] + n d M[x^(n-1)] for x ~ N(m, d), "
+    "from M[1] = 1 and M[x] = m.",
+    "noise": "A noise is independent of the state and of the other noises, with M[w] = 0 and "
+    "M[w^2] = 1.",
     "square": "The square of a sum has the square of each term, and each pair of terms twice.",
     "constant": "A constant comes out of a mean as it is, and out of a square squared.",
-    "sign": "A minus before a bracket turns the sign of every term in it; even powers have no sign.",
-    "functions": "M[exp(s x)] = exp(s m + s^2 d/2) for x ~ N(m, d); sines and cosines by imaginary s.",
-    "terms": "Multiply both lines out, and compare them term by term: each term must stand in both.",
+    "sign": "A minus before a bracket turns the sign of every term in it; even powers have no "
+    "sign.",
+    "functions": "M[exp(s x)] = exp(s m + s^2 d/2) for x ~ N(m, d); sines and cosines by "
+    "imaginary s.",
+    "terms": "Multiply both lines out, and compare them term by term: each term must stand in "
+    "both.",
 }
 DEFINITIONS = {
     "gaussian": {
@@ -28,14 +34,19 @@ DEFINITIONS = {
     },
     "linearised": {
         "tau": "Linearised, tau is the state equation at the mean, without noise.",
-        "Theta": "Linearised, Theta is slope squared times variance, and the noise's factor at the mean, squared.",
+        "Theta": "Linearised, Theta is slope squared times variance, and the noise's factor at "
+        "the mean, squared.",
         "h": "Linearised, h is the meter equation at the mean, without noise.",
         "G": "Linearised, G is the derivative of the meter equation by the state, at the mean.",
-        "F": "Linearised, F is slope squared times variance, and the noise's factor at the mean, squared.",
+        "F": "Linearised, F is slope squared times variance, and the noise's factor at the mean, "
+        "squared.",
         "y": "y is the meter equation.",
     },
 }
-UNEXPLAINED = "It is not equal to {above}, and no single change explains it: was more than one step taken at once?"
+UNEXPLAINED = (
+    "It is not equal to {above}, and no single change explains it: was more than one "
+    "step taken at once?"
+)
 
 
 def shown(text: str, node: Node) -> str:
@@ -43,28 +54,43 @@ def shown(text: str, node: Node) -> str:
     return text[slice(*node.span)] if node.span else written(node)
 
 
-def told(setting: Setting, slip: Slip, text: str, line: Node, text_above: str, above: Node) -> tuple[str, str]:
+def told(
+    setting: Setting, slip: Slip, text: str, line: Node, text_above: str, above: Node
+) -> tuple[str, str]:
     """What to say of a slip, and the term that is named.
 
-    `text_above` is empty if nothing that the student typed stands above: then nothing of it is quoted.
+    `text_above` is empty if nothing that the student typed stands above: then nothing of it is
+    quoted.
     """
     if slip.above:
         term = shown(text_above, at(above, named(above, slip.path))) if text_above else ""
         where = f"`{term}` of the line above" if term else "a term of the definition"
         return f"what has been made of {where} is not right{_moment(slip)}", term
     place = named(line, slip.path)
-    term, of = shown(text, at(line, place)), "the sign of" if place == term_path(line, slip.path) else "a sign in"
+    term, of = (
+        shown(text, at(line, place)),
+        "the sign of" if place == term_path(line, slip.path) else "a sign in",
+    )
     says: dict[str, Callable[[], str]] = {
         "sign": lambda: f"{of} `{term}` is not right",
         "doubled": lambda: f"`{term}` stands there twice",
-        "letter": lambda: f"in `{term}` the letter {slip.name}, {_role(setting, slip.name)}, stands in another one's place",
+        "letter": lambda: (
+            f"in `{term}` the letter {slip.name}, {_role(setting, slip.name)}, stands in another "
+            f"one's place"
+        ),
         "moment": lambda: f"`{term}` is not right{_moment(slip)}",
         "power": lambda: f"{slip.name or 'something'} has the wrong power in `{term}`",
         "factor": lambda: f"a number in `{term}` is not right",
-        "noise-forgotten": lambda: f"the mean square of the noise {slip.name} is forgotten: its part is missing",
+        "noise-forgotten": lambda: (
+            f"the mean square of the noise {slip.name} is forgotten: its part is missing"
+        ),
         "noise-mean": lambda: f"the mean of the noise {slip.name} is not zero in this line",
         "lost-factor": lambda: f"a factor is lost from `{term}`: {slip.name}",
-        "extra": lambda: f"something in `{term}` does not belong there" if slip.name else f"`{term}` does not belong there",
+        "extra": lambda: (
+            f"something in `{term}` does not belong there"
+            if slip.name
+            else f"`{term}` does not belong there"
+        ),
         "function": lambda: f"in `{term}` another function belongs in the place of {slip.name}",
         "lost": lambda: f"a term is lost{_lost(slip, text_above)}, in `{term}`",
         "combined": lambda: f"`{term}` is not right: more than one of its factors",
@@ -96,18 +122,27 @@ def _role(setting: Setting, name: str) -> str:
 
 
 def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str) -> str:
-    """Which rule the right step uses: the definition, if the line above is a name; else by what the step has done away with."""
+    """Which rule the right step uses: the definition, if the line above is a name; else by what the
+    step has done away with."""
     bare = name.rstrip("0123456789")
     if name and bare in DEFINITIONS[setting.kind]:
         return DEFINITIONS[setting.kind][bare]
     kind = slip.kind if slip else ""
     lost = letters(above) - letters(line)
     noises = lost & set(setting.law.noises)
-    if kind in ("noise-forgotten", "noise-mean") or (noises and kind in ("extra", "lost", "doubled", "")):
+    if kind in ("noise-forgotten", "noise-mean") or (
+        noises and kind in ("extra", "lost", "doubled", "")
+    ):
         return RULES["noise"]
     states = [one for one in _means(above) if letters(one) & set(setting.law.states)]
-    if kind == "moment" or (len(states) > len([one for one in _means(line) if letters(one) & set(setting.law.states)])):
-        return RULES["functions" if any(one.kind == CALL for mean in states for _, one in walk(mean)) else "moments"]
+    if kind == "moment" or (
+        len(states) > len([one for one in _means(line) if letters(one) & set(setting.law.states)])
+    ):
+        return RULES[
+            "functions"
+            if any(one.kind == CALL for mean in states for _, one in walk(mean))
+            else "moments"
+        ]
     if kind in ("lost", "factor", "extra") and _squares(above) > _squares(line):
         return RULES["square"]
     if kind in ("power", "lost-factor") and slip and slip.name not in setting.law.random:

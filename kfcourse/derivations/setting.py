@@ -1,7 +1,10 @@
-"""What letters mean in a derivation: the law of the state, the noises, the structural functions of a model.
+"""What letters mean in a derivation: the law of the state, the noises, the structural functions of
+a model.
 
-Means M[...] are over a normal law of the state, x ~ N(m, d), and over standard normal noises, independent of it and of each
-other.  A structural function is a tree with means in it, so that it is computed as everything else is.
+Means M[...] are over a normal law of the state, x ~ N(m, d), and over standard normal noises,
+independent of it and of each
+other.  A structural function is a tree with means in it, so that it is computed as everything else
+is.
 """
 
 from __future__ import annotations
@@ -41,7 +44,8 @@ OF_FILTERS = (
 
 @dataclass(frozen=True)
 class Law:
-    """Which letters are random: states of a normal law with these letters for mean and covariance, and standard normal noises."""
+    """Which letters are random: states of a normal law with these letters for mean and covariance,
+    and standard normal noises."""
 
     states: tuple[str, ...] = ("x",)
     means: tuple[str, ...] = ("m",)
@@ -63,7 +67,9 @@ class Law:
         if n == 1:
             return replace(self, means=(mean,), cov=((cov,),))
         pairs = [[f"{cov}{min(i, j) + 1}{max(i, j) + 1}" for j in range(n)] for i in range(n)]
-        return replace(self, means=tuple(f"{mean}{i + 1}" for i in range(n)), cov=tuple(map(tuple, pairs)))
+        return replace(
+            self, means=tuple(f"{mean}{i + 1}" for i in range(n)), cov=tuple(map(tuple, pairs))
+        )
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,8 @@ class Setting:
     ----------
     law : Law
     meanings : mapping
-        Name to tree, of what is no free letter: structural functions of a model, what was derived before.
+        Name to tree, of what is no free letter: structural functions of a model, what was derived
+        before.
     positive : frozenset of str
         Letters that were declared positive; variances are without saying.
     known : frozenset of str, optional
@@ -99,12 +106,16 @@ class Setting:
         """What is wrong with a letter; None if it may be used."""
         if self.known is None:
             return None
-        of_law = self.law.letters if self.known.intersection(self.law.random) else ()  # nothing is random: there is no law either
+        # nothing is random: there is no law either
+        of_law = self.law.letters if self.known.intersection(self.law.random) else ()
         known = {*self.known, *self.meanings, *of_law}
         if name in known:
             return None
         names = ", ".join(sorted(known))
-        return f"unknown letter {name!r}; known here: {names}. Declare another one in a line of its own: letters {name}"
+        return (
+            f"unknown letter {name!r}; known here: {names}. Declare another one in a line of "
+            f"its own: letters {name}"
+        )
 
     def at(self, mean_name: str, cov_name: str) -> Setting:
         """The same for a law x ~ N(mean, covariance) with these letters."""
@@ -116,7 +127,8 @@ class Setting:
 
 
 def of_model(model: Model, kind: str = "gaussian") -> Setting:
-    """The setting of a model: its parameters, noises and structural functions; tau and Theta take x ~ N(z, p) (see `of_side`).
+    """The setting of a model: its parameters, noises and structural functions; tau and Theta take x
+    ~ N(z, p) (see `of_side`).
 
     Raises
     ------
@@ -126,12 +138,15 @@ def of_model(model: Model, kind: str = "gaussian") -> Setting:
     for one, which in ((model.state_noise, "state_noise"), (model.meter_noise, "meter_noise")):
         if np.any(one.mean != 0) or np.any(one.cov != np.eye(len(one.mean))):
             raise ModelError(
-                f"derivations are checked for standard normal noises, and `{which}` is another law; scale it in the equation"
+                f"derivations are checked for standard normal noises, and `{which}` is another "
+                f"law; scale it in the equation"
             )
     if model.timed:
         raise ModelError("derivations are checked for equations that do not depend on the step")
     states, noises = tuple(s.name for s in model.x), tuple(s.name for s in (*model.v, *model.w))
-    law = Law(states, noises=noises).at(*(f"{name}_" if name in model.parameters else name for name in ("m", "d")))
+    law = Law(states, noises=noises).at(
+        *(f"{name}_" if name in model.parameters else name for name in ("m", "d"))
+    )
     known = {*states, *noises, *model.parameters, *OF_FILTERS}
     return with_functions(Setting(law, known=frozenset(known), model=model, kind=kind))
 
@@ -143,23 +158,33 @@ def of_side(setting: Setting, name: str) -> Setting:
 
 
 def with_functions(setting: Setting) -> Setting:
-    """The setting with the structural functions of its model at its law; a letter of the model keeps its own meaning."""
+    """The setting with the structural functions of its model at its law; a letter of the model
+    keeps its own meaning."""
     if setting.model is None:
         return setting
     model, law = setting.model, setting.law
     n = len(law.states)
-    own = {s.name for s in (*model.x, *model.v, *model.w)} | set(model.parameters) | set(law.letters)
+    own = (
+        {s.name for s in (*model.x, *model.v, *model.w)} | set(model.parameters) | set(law.letters)
+    )
     found: dict[str, Node] = {}
     if setting.kind == "gaussian":
-        for first, second, equations in (("tau", "Theta", model.state_equation), ("h", "F", model.meter_equation)):
+        for first, second, equations in (
+            ("tau", "Theta", model.state_equation),
+            ("h", "F", model.meter_equation),
+        ):
             found |= _moments(first, second, [tree_of(one) for one in equations], own)
         for i, one in enumerate(model.meter_equation):
             for j, x in enumerate(model.x):
                 found[_entry("G", i, j, model.p, n)] = mean(tree_of(sp.diff(one, x)))
     else:
         found |= _linearised(model, law)
-    found |= {name: tree_of(one) for name, one in zip(model.measured, model.meter_equation, strict=True)}
-    return replace(setting, meanings={name: tree for name, tree in found.items() if name not in own})
+    found |= {
+        name: tree_of(one) for name, one in zip(model.measured, model.meter_equation, strict=True)
+    }
+    return replace(
+        setting, meanings={name: tree for name, tree in found.items() if name not in own}
+    )
 
 
 def _entry(name: str, i: int, j: int, rows: int, columns: int) -> str:
@@ -167,13 +192,17 @@ def _entry(name: str, i: int, j: int, rows: int, columns: int) -> str:
 
 
 def _moments(first: str, second: str, equations: list[Node], taken: set[str]) -> dict[str, Node]:
-    """Means and covariances of equations; a covariance is around the mean's own letter, so that it follows what was derived."""
+    """Means and covariances of equations; a covariance is around the mean's own letter, so that it
+    follows what was derived."""
     size = len(equations)
     names = [first if size == 1 else f"{first}{i + 1}" for i in range(size)]
     found = {name: mean(one) for name, one in zip(names, equations, strict=True)}
     for i in range(size):
         for j in range(i, size):
-            deviations = [difference(equations[k], found[names[k]] if names[k] in taken else letter(names[k])) for k in (i, j)]
+            deviations = [
+                difference(equations[k], found[names[k]] if names[k] in taken else letter(names[k]))
+                for k in (i, j)
+            ]
             tree = mean(power(deviations[0], 2) if i == j else product(*deviations))
             found[_entry(second, i, j, size, size)] = found[_entry(second, j, i, size, size)] = tree
     return found
@@ -181,18 +210,29 @@ def _moments(first: str, second: str, equations: list[Node], taken: set[str]) ->
 
 def _linearised(model: Model, law: Law) -> dict[str, Node]:
     """The equations and their slopes at the mean, and A p A^T + B B^T."""
-    at_mean = dict(zip(model.x, map(symbol, law.means), strict=True)) | {s: sp.S.Zero for s in (*model.v, *model.w)}
+    at_mean = dict(zip(model.x, map(symbol, law.means), strict=True)) | {
+        s: sp.S.Zero for s in (*model.v, *model.w)
+    }
     cov = sp.Matrix(len(law.states), len(law.states), lambda i, j: symbol(law.cov[i][j]))
     found: dict[str, sp.Expr] = {}
     for first, second, equation, noise in (
         ("tau", "Theta", model.state_equation, model.v),
         ("h", "F", model.meter_equation, model.w),
     ):
-        A, B = (equation.jacobian(sp.Matrix(one)).subs(at_mean, simultaneous=True) for one in (model.x, noise))
+        A, B = (
+            equation.jacobian(sp.Matrix(one)).subs(at_mean, simultaneous=True)
+            for one in (model.x, noise)
+        )
         values, size = equation.subs(at_mean, simultaneous=True), equation.rows
         covariance = A * cov * A.T + B * B.T
         found |= {first if size == 1 else f"{first}{i + 1}": values[i] for i in range(size)}
-        found |= {_entry(second, i, j, size, size): covariance[i, j] for i in range(size) for j in range(size)}
+        found |= {
+            _entry(second, i, j, size, size): covariance[i, j]
+            for i in range(size)
+            for j in range(size)
+        }
         if first == "h":
-            found |= {_entry("G", i, j, *A.shape): A[i, j] for i in range(A.rows) for j in range(A.cols)}
+            found |= {
+                _entry("G", i, j, *A.shape): A[i, j] for i in range(A.rows) for j in range(A.cols)
+            }
     return {name: tree_of(formula) for name, formula in found.items()}

@@ -1,4 +1,5 @@
-"""The tree of a line as it was typed: nothing is simplified, so that each term can be named and changed."""
+"""The tree of a line as it was typed: nothing is simplified, so that each term can be named and
+changed."""
 
 from __future__ import annotations
 
@@ -9,20 +10,30 @@ from typing import Any, TypeAlias
 
 Path: TypeAlias = tuple[int, ...]
 
-NUMBER, LETTER, SUM, PRODUCT, POWER, CALL, MEAN = "number", "letter", "sum", "product", "power", "call", "mean"
+NUMBER, LETTER, SUM, PRODUCT, POWER, CALL, MEAN = (
+    "number",
+    "letter",
+    "sum",
+    "product",
+    "power",
+    "call",
+    "mean",
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A node of the tree; two nodes are the same only if they are one object, so that values can be kept by node.
+    """A node of the tree; two nodes are the same only if they are one object, so that values can be
+    kept by node.
 
     Attributes
     ----------
     kind : {"number", "letter", "sum", "product", "power", "call", "mean"}
     parts : tuple of Node
     data
-        Of a number its value (Fraction), of a letter its name, of a function its name, of a power its exponent (Fraction);
-        of a sum a sign for each term; of a product 1 for a factor and -1 for a divisor.
+        Of a number its value (Fraction), of a letter its name, of a function its name, of a power
+        its exponent (Fraction); of a sum a sign for each term; of a product 1 for a factor and -1
+        for a divisor.
     span : pair of int, optional
         Where it stands in the line.
     """
@@ -95,7 +106,11 @@ def replaced(node: Node, names: dict[str, Node]) -> Node:
     """The tree with other nodes in the place of letters."""
     if node.kind == LETTER:
         return names.get(node.data, node)
-    return replace(node, parts=tuple(replaced(part, names) for part in node.parts)) if node.parts else node
+    return (
+        replace(node, parts=tuple(replaced(part, names) for part in node.parts))
+        if node.parts
+        else node
+    )
 
 
 def written(node: Node) -> str:
@@ -114,10 +129,15 @@ def _written(node: Node, strength: int) -> str:
         text = "".join(f" {'+' if sign > 0 else '-'} {_written(part, 2)}" for sign, part in pairs)
         own, text = 1, text[3:] if pairs[0][0] > 0 else f"-{text[3:]}"
     elif node.kind == PRODUCT:
-        text = "".join(f"{'*' if e > 0 else '/'}{_written(part, 3)}" for e, part in zip(node.data, node.parts, strict=True))
+        text = "".join(
+            f"{'*' if e > 0 else '/'}{_written(part, 3)}"
+            for e, part in zip(node.data, node.parts, strict=True)
+        )
         own, text = 2, text[1:] if node.data[0] > 0 else f"1{text}"
     elif node.kind == POWER:
-        exponent = str(node.data) if node.data.denominator == 1 and node.data > 0 else f"({node.data})"
+        exponent = (
+            str(node.data) if node.data.denominator == 1 and node.data > 0 else f"({node.data})"
+        )
         own, text = 3, f"{_written(node.parts[0], 4)}^{exponent}"
     else:
         inner = _written(node.parts[0], 0)

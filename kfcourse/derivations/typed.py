@@ -1,7 +1,8 @@
 """Text -> tree: a line of a derivation, read without running it.
 
-Characters, length and syntax are those of `symbolic.formula`, and so are numbers; in addition a power may be typed ^, and there
-are means: M[...], the variance D[...] = M[...^2] - M[...]^2, and Cov[..., ...].
+Characters, length and syntax are those of `symbolic.formula`, and so are numbers; in addition a
+power may be typed ^, and there are means: M[...], the variance D[...] = M[...^2] - M[...]^2, and
+Cov[..., ...].
 """
 
 from __future__ import annotations
@@ -56,14 +57,19 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
     for found in _OTHERWISE.finditer(text):
         new = _IN_PYTHON[found[0]]
         pieces += [text[end : found.start()], new]
-        columns += [*range(end, found.start()), *(min(found.start() + i, found.end() - 1) for i in range(len(new)))]
+        columns += [
+            *range(end, found.start()),
+            *(min(found.start() + i, found.end() - 1) for i in range(len(new))),
+        ]
         end = found.end()
     python, columns = "".join([*pieces, text[end:]]), [*columns, *range(end, len(text) + 1)]
     try:
         formula, tree, offset = syntax(python)
         return _Lines(formula, offset, name, columns).read(tree)
     except FormulaError as error:
-        problem = error.problem.replace("lambda_", "lambda").replace("; write ** for a power (x**2)", "")
+        problem = error.problem.replace("lambda_", "lambda").replace(
+            "; write ** for a power (x**2)", ""
+        )
         raise FormulaError(text, problem, columns[min(error.column, len(columns) - 1)]) from None
     except RecursionError:
         raise FormulaError(text, "the line is nested too deeply; split the step up") from None
@@ -72,7 +78,9 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
 class _Lines(Reader):
     """Turns white-listed syntax nodes into a tree."""
 
-    def __init__(self, formula: str, offset: int, known: Callable[[str], str | None], columns: list[int]):
+    def __init__(
+        self, formula: str, offset: int, known: Callable[[str], str | None], columns: list[int]
+    ):
         super().__init__(formula, {}, offset)
         self.known, self.columns = known, columns
         self.depth = self.count = 0
@@ -80,13 +88,22 @@ class _Lines(Reader):
     def read(self, node: ast.expr) -> Node:
         self.depth, self.count = self.depth + 1, self.count + 1
         if self.depth > DEEPEST:
-            raise self.fail(node, f"brackets stand one in the other more than {DEEPEST} deep; split the step up")
+            raise self.fail(
+                node, f"brackets stand one in the other more than {DEEPEST} deep; split the step up"
+            )
         if self.count > LONGEST:
-            raise self.fail(node, f"the line has more than {LONGEST} numbers, letters and signs; split the step up")
+            raise self.fail(
+                node,
+                f"the line has more than {LONGEST} numbers, letters and signs; split the step up",
+            )
         start, end = node.col_offset, node.end_col_offset or node.col_offset + 1
         place = self.columns[self.offset + start], self.columns[self.offset + end - 1] + 1
         tree = self._tree(node)
-        tree = replace(tree, span=place, parts=tuple(one if one.span else replace(one, span=place) for one in tree.parts))
+        tree = replace(
+            tree,
+            span=place,
+            parts=tuple(one if one.span else replace(one, span=place) for one in tree.parts),
+        )
         self.depth -= 1
         return tree
 
@@ -111,15 +128,24 @@ class _Lines(Reader):
                 return self._mean(node, name, list(of.elts) if isinstance(of, ast.Tuple) else [of])
             case ast.Call(func=ast.Name(id=name), keywords=[]) if name in MEANS:
                 return self._mean(node, name, node.args)
-            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
+            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if (
+                name in FUNCTIONS
+            ):
                 inner = self.read(argument)
-                return power(inner, Fraction(1, 2)) if name == "sqrt" else Node(CALL, (inner,), name)
+                return (
+                    power(inner, Fraction(1, 2)) if name == "sqrt" else Node(CALL, (inner,), name)
+                )
             case ast.Call():
                 known = ", ".join((*FUNCTIONS, "M[...]"))
                 raise self.fail(
-                    node, f"a function that is not known here, or a product without *; known with one argument: {known}"
+                    node,
+                    f"a function that is not known here, or a product without *; known with one "
+                    f"argument: {known}",
                 )
-        raise self.fail(node, "this has no meaning here; only + - * / ^ numbers, letters, functions and means M[...]")
+        raise self.fail(
+            node,
+            "this has no meaning here; only + - * / ^ numbers, letters, functions and means M[...]",
+        )
 
     def _letter(self, node: ast.Name) -> Node:
         name = "lambda" if node.id == "lambda_" else node.id
@@ -137,16 +163,22 @@ class _Lines(Reader):
             parts.append((1 if isinstance(inner.op, operators[0]) else -1, inner.right))
             inner = inner.left
             if len(parts) > LONGEST:
-                raise self.fail(node, f"the line has more than {LONGEST} numbers, letters and signs; split the step up")
+                raise self.fail(
+                    node,
+                    f"the line has more than {LONGEST} numbers, letters and signs; split the step "
+                    f"up",
+                )
         signs: list[int] = []
         trees: list[Node] = []
         minus = False
         for sign, part in [(1, inner), *reversed(parts)]:
             tree = self.read(part)
-            if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:  # -a + b: the sign of a term, not a sum in a sum
+            # -a + b: the sign of a term, not a sum in a sum
+            if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:
                 (own,), (one,) = tree.data, tree.parts
                 sign, tree = sign * own, one
-            elif kind == PRODUCT and not trees and tree.kind == SUM and len(tree.parts) == 1:  # -a*b is -(a*b)
+            # -a*b is -(a*b)
+            elif kind == PRODUCT and not trees and tree.kind == SUM and len(tree.parts) == 1:
                 minus, tree = tree.data == (-1,), tree.parts[0]
             signs.append(sign)
             trees.append(tree)
@@ -156,16 +188,23 @@ class _Lines(Reader):
     def _power(self, node: ast.BinOp) -> Node:
         exponent = _constant(self.read(node.right))
         if exponent is None:
-            raise self.fail(node.right, "an exponent must be a plain number; write exp(...) for exponentials")
+            raise self.fail(
+                node.right, "an exponent must be a plain number; write exp(...) for exponentials"
+            )
         if abs(exponent) > MAX_EXPONENT or exponent.denominator > MAX_EXPONENT:
-            raise self.fail(node.right, f"the exponent is larger than {MAX_EXPONENT}, or too fine a fraction")
+            raise self.fail(
+                node.right, f"the exponent is larger than {MAX_EXPONENT}, or too fine a fraction"
+            )
         return power(self.read(node.left), exponent)
 
     def _mean(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
         wanted = 2 if name == "Cov" else 1
         if len(arguments) != wanted:
             raise self.fail(
-                node, "Cov takes two expressions: Cov[a, b]" if wanted == 2 else f"{name} takes one expression: {name}[a]"
+                node,
+                "Cov takes two expressions: Cov[a, b]"
+                if wanted == 2
+                else f"{name} takes one expression: {name}[a]",
             )
         first, second = (self.read(one) for one in (arguments[0], arguments[-1]))
         if name == "M":
@@ -182,9 +221,16 @@ def _constant(node: Node) -> Fraction | None:
     if node.kind not in (SUM, PRODUCT):
         return None
     parts = [_constant(part) for part in node.parts]
-    if None in parts or (node.kind == PRODUCT and any(e < 0 and not part for e, part in zip(node.data, parts, strict=True))):
+    if None in parts or (
+        node.kind == PRODUCT
+        and any(e < 0 and not part for e, part in zip(node.data, parts, strict=True))
+    ):
         return None
-    value = sum((s * p for s, p in zip(node.data, parts, strict=True)), Fraction(0)) if node.kind == SUM else Fraction(1)
+    value = (
+        sum((s * p for s, p in zip(node.data, parts, strict=True)), Fraction(0))
+        if node.kind == SUM
+        else Fraction(1)
+    )
     for e, part in zip(node.data, parts, strict=True) if node.kind == PRODUCT else ():
         value *= part**e
     return value

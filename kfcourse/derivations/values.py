@@ -1,8 +1,9 @@
 r"""A tree at random points, and its means there by Gauss-Hermite quadrature.
 
-With n nodes on an axis the mean of a polynomial is exact up to degree 2n - 1; the exponentials, sines and cosines of linear
-functions that may stand in a mean are entire, and with `FUNCTION_NODES` nodes exact to rounding for the slopes tried here.
-Beside each value goes a bound of its terms' sizes, \|a\| + \|b\| for a - b: rounding is relative to that.
+With n nodes on an axis the mean of a polynomial is exact up to degree 2n - 1; the exponentials,
+sines and cosines of linear functions that may stand in a mean are entire, and with `FUNCTION_NODES`
+nodes exact to rounding for the slopes tried here. Beside each value goes a bound of its terms'
+sizes, \|a\| + \|b\| for a - b: rounding is relative to that.
 """
 
 from __future__ import annotations
@@ -18,10 +19,15 @@ from kfcourse.laws import Array
 
 ENTIRE = ("exp", "sin", "cos", "sinh", "cosh")  # functions that may stand in a mean
 FUNCTION_NODES = 32
-ROUNDING = 1e-10  # of the size of the terms: some thousand operations of 1e-16 each, and nodes and weights known to 1e-13
+# of the size of the terms: some thousand operations of 1e-16 each, and nodes and weights known to
+# 1e-13
+ROUNDING = 1e-10
 TRIED = 18  # points; a third of them with all letters positive
 
-NO_MEAN = "in a mean only polynomials are computed, and exp, sin, cos, sinh, cosh of linear ones; take the rest out of M[...]"
+NO_MEAN = (
+    "in a mean only polynomials are computed, and exp, sin, cos, sinh, cosh of linear ones; "
+    "take the rest out of M[...]"
+)
 
 _FUNCTIONS = {
     name: getattr(np, {"atan": "arctan", "abs": "abs"}.get(name, name))
@@ -38,14 +44,21 @@ class Uncomputed(ValueError):
 
 
 def degrees(node: Node, setting: Setting) -> dict[str, float]:
-    """A bound on the degree in each random letter; infinite inside a function; Uncomputed where no mean is computed."""
+    """A bound on the degree in each random letter; infinite inside a function; Uncomputed where no
+    mean is computed."""
     if node.kind == NUMBER or node.kind == MEAN:
         if node.kind == MEAN:
             degrees(node.parts[0], setting)
         return {}
     if node.kind == LETTER:
         meaning = setting.meanings.get(node.data)
-        return {node.data: 1} if node.data in setting.law.random else degrees(meaning, setting) if meaning else {}
+        return (
+            {node.data: 1}
+            if node.data in setting.law.random
+            else degrees(meaning, setting)
+            if meaning
+            else {}
+        )
     parts = [degrees(part, setting) for part in node.parts]
     names = {name for part in parts for name in part}
     if node.kind == SUM:
@@ -70,7 +83,9 @@ def means(node: Node, setting: Setting) -> list[Node]:
     if node.kind == LETTER:
         meaning = setting.meanings.get(node.data)
         return means(meaning, setting) if meaning else []
-    return ([node] if node.kind == MEAN else []) + [one for part in node.parts for one in means(part, setting)]
+    return ([node] if node.kind == MEAN else []) + [
+        one for part in node.parts for one in means(part, setting)
+    ]
 
 
 class Values:
@@ -94,8 +109,12 @@ class Values:
                     found[name] = max(found.get(name, 0), degree)
         self.axes = {name: i for i, name in enumerate(setting.law.random)}
         n = len(setting.law.states)
-        most = max((found.get(x, 0) for x in setting.law.states), default=0)  # a component is made of several normal numbers
-        sizes = [most if name in setting.law.states and n > 1 else found.get(name, 0) for name in setting.law.random]
+        # a component is made of several normal numbers
+        most = max((found.get(x, 0) for x in setting.law.states), default=0)
+        sizes = [
+            most if name in setting.law.states and n > 1 else found.get(name, 0)
+            for name in setting.law.random
+        ]
         self.nodes = [hermite(FUNCTION_NODES if np.isinf(s) else int(s) + 2) for s in sizes]
         self.seed = seed
         self.letters: dict[str, Array] = {}
@@ -110,7 +129,10 @@ class Values:
         """Values, and the sizes of the terms that they are made of."""
         with np.errstate(all="ignore"):
             value, size = self._value(node, False, keep)
-        first, second = (np.broadcast_to(one.reshape(one.shape[0], -1)[:, 0], self.points) for one in (value, size))
+        first, second = (
+            np.broadcast_to(one.reshape(one.shape[0], -1)[:, 0], self.points)
+            for one in (value, size)
+        )
         return first, second
 
     def _column(self, values: Array) -> Array:
@@ -132,7 +154,9 @@ class Values:
         if n == 1:
             self.roots = np.sqrt(self._random(law.cov[0][0]))[:, None, None]
         else:
-            lower = np.array([[self._random(f"root/{i}/{j}") for j in range(n)] for i in range(n)]).transpose(2, 0, 1)
+            lower = np.array(
+                [[self._random(f"root/{i}/{j}") for j in range(n)] for i in range(n)]
+            ).transpose(2, 0, 1)
             lower = np.tril(lower, -1) * 0.5 + np.abs(lower) * np.eye(n)
             cov = lower @ lower.transpose(0, 2, 1)
             self.roots = lower
@@ -178,7 +202,11 @@ class Values:
         if node.kind == LETTER:
             if node.data in self.setting.meanings:
                 return self._value(self.setting.meanings[node.data], inside, True)
-            value = self._on_axis(node.data) if inside and node.data in self.axes else self._column(self.letter(node.data))
+            value = (
+                self._on_axis(node.data)
+                if inside and node.data in self.axes
+                else self._column(self.letter(node.data))
+            )
             return value, np.abs(value)
         if node.kind == MEAN:
             value, size = self._value(node.parts[0], True, keep)
@@ -205,20 +233,24 @@ class Values:
         if node.kind == POWER:
             exponent = float(node.data)
             value = np.abs(inner) ** exponent if node.data.numerator % 2 == 0 else inner**exponent
-            return value, its_size**exponent if exponent > 0 else np.abs(value) * (its_size / np.abs(inner)) ** -exponent
+            return value, its_size**exponent if exponent > 0 else np.abs(value) * (
+                its_size / np.abs(inner)
+            ) ** -exponent
         value = _FUNCTIONS[node.data](inner)
         return value, np.abs(value) + np.maximum(1, np.abs(value)) * its_size
 
 
 @lru_cache
 def hermite(count: int) -> tuple[Array, Array]:
-    """Nodes and weights for the standard normal law, exact for polynomials up to degree 2 count - 1."""
+    """Nodes and weights for the standard normal law, exact for polynomials up to degree 2 count -
+    1."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(count)
     return nodes, weights / weights.sum()
 
 
 def agree(first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
-    """At which points two values with their sizes are equal; where one of them has no value, they are not."""
+    """At which points two values with their sizes are equal; where one of them has no value, they
+    are not."""
     (a, size_a), (b, size_b) = first, second
     with np.errstate(all="ignore"):
         return np.abs(a - b) <= ROUNDING * (size_a + size_b)

@@ -1,7 +1,7 @@
 """Each line of a derivation beside the one above it.
 
-After a line that differs the check goes on from that line, as the student did: a later one is right on top of it, or wrong in
-itself; or it is right in itself, equal to what stood before the slip.
+After a line that differs the check goes on from that line, as the student did: a later one is right
+on top of it, or wrong in itself; or it is right in itself, equal to what stood before the slip.
 """
 
 from __future__ import annotations
@@ -22,7 +22,15 @@ from kfcourse.symbolic.formula import FormulaError
 BEGINS, RIGHT, DIFFERS, FOLLOWS, AGAIN, UNREADABLE, UNDECIDED = (
     "begins", "right", "differs", "follows", "right in itself", "unreadable", "undecided",
 )  # fmt: skip
-MARKS = {BEGINS: "·", RIGHT: "✓", FOLLOWS: "✓", AGAIN: "✓", DIFFERS: "✗", UNREADABLE: "?", UNDECIDED: "?"}
+MARKS = {
+    BEGINS: "·",
+    RIGHT: "✓",
+    FOLLOWS: "✓",
+    AGAIN: "✓",
+    DIFFERS: "✗",
+    UNREADABLE: "?",
+    UNDECIDED: "?",
+}
 SECONDS = 20.0  # for one line
 
 
@@ -39,7 +47,8 @@ class Verdict:
         Follows: equal to the line above, which stands on a slip.
     says : str
     kinds : tuple of str
-        Of slips that explain a line that differs; more than one only if two explain it equally well.
+        Of slips that explain a line that differs; more than one only if two explain it equally
+        well.
     terms : tuple of str
         The terms that they name.
     spans : tuple of pairs
@@ -65,7 +74,8 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Derived:
-    """One chain: its name, if a name stands at its left; its lines; whether no mean is left at its end."""
+    """One chain: its name, if a name stands at its left; its lines; whether no mean is left at its
+    end."""
 
     name: str
     verdicts: tuple[Verdict, ...]
@@ -130,10 +140,13 @@ def check_text(text: str, find: FindModel | None, setting: Setting | None = None
            nothing to compare it with: the chain is checked from here
        2 ✗ d^2
            the line differs from the one above: a number in `d^2` is not right
-           Moments of a normal law: M[x^(n+1)] = m M[x^n] + n d M[x^(n-1)] for x ~ N(m, d), from M[1] = 1 and M[x] = m.
+           Moments of a normal law: M[x^(n+1)] = m M[x^n] + n d M[x^(n-1)] for x ~ N(m, d), from
+           M[1] = 1 and M[x] = m.
     """
     derived: dict[str, tuple[Law, Node]] = {}
-    return Report(tuple(_Chain(chain, derived).checked() for chain in read_chains(text, find, setting)))
+    return Report(
+        tuple(_Chain(chain, derived).checked() for chain in read_chains(text, find, setting))
+    )
 
 
 @dataclass
@@ -154,12 +167,20 @@ class _Chain:
         above = "" if meant or name else first.text
         links = iter(rest if name else self.chain.links)
         self.right: Node | None = previous  # the last line that is right
-        broken = 0  # number of the line with the first slip, after which nothing was right in itself
+        # number of the line with the first slip, after which nothing was right in itself
+        broken = 0
         for link in links:
             try:
                 with time_limit(SECONDS):
                     node = link.read(self.setting)
-                    broken = self._line(link, node, previous, above, name if previous is not None and not above else "", broken)
+                    broken = self._line(
+                        link,
+                        node,
+                        previous,
+                        above,
+                        name if previous is not None and not above else "",
+                        broken,
+                    )
             except FormulaError as error:
                 self._says(link, UNREADABLE, _marked(link, error))
                 continue
@@ -167,28 +188,44 @@ class _Chain:
                 self._says(link, UNDECIDED, str(error))
                 continue
             except OutOfTime:
-                self._says(link, UNDECIDED, f"it cannot be compared within {SECONDS:g} s: split the step up")
+                self._says(
+                    link,
+                    UNDECIDED,
+                    f"it cannot be compared within {SECONDS:g} s: split the step up",
+                )
                 continue
             previous, above = node, link.text
-        if name and previous is not None and name not in self.setting.law.letters and not self._comes_back(name, previous):
+        if (
+            name
+            and previous is not None
+            and name not in self.setting.law.letters
+            and not self._comes_back(name, previous)
+        ):
             self.derived[name] = self.setting.law, previous
         closed = previous is not None and not any(one.kind == MEAN for _, one in walk(previous))
         return Derived(name, tuple(self.found), meant or not name, closed)
 
     def _comes_back(self, name: str, tree: Node) -> bool:
-        """Whether what stands for a name has the name in it again, as the letters mean here: nothing is derived in a circle."""
+        """Whether what stands for a name has the name in it again, as the letters mean here:
+        nothing is derived in a circle."""
         seen: set[str] = set()
         waiting = [tree]
         while waiting:
             new = {one.data for _, one in walk(waiting.pop()) if one.kind == LETTER} - seen
             seen |= new
-            waiting += [self.setting.meanings[one] for one in new if one != name and one in self.setting.meanings]
+            waiting += [
+                self.setting.meanings[one]
+                for one in new
+                if one != name and one in self.setting.meanings
+            ]
         return name in seen
 
     def _says(self, link: Typed, status: str, says: str = "", **more: Any) -> None:
         self.found.append(Verdict(link.line, link.column, link.text, status, says, **more))
 
-    def _line(self, link: Typed, node: Node, previous: Node | None, above: str, name: str, broken: int) -> int:
+    def _line(
+        self, link: Typed, node: Node, previous: Node | None, above: str, name: str, broken: int
+    ) -> int:
         """Judge one line; returns the number of the line with the slip on which it stands, or 0."""
         if previous is None:
             compare(self.setting, node, node)  # a mean that is not computed is said here
@@ -204,22 +241,33 @@ class _Chain:
                 self._says(link, FOLLOWS, f"right on top of line {broken}")
             return broken
         if broken and self.right is not None and compare(self.setting, node, self.right) == EQUAL:
-            self._says(link, AGAIN, f"right in itself: equal to what stood before the slip of line {broken}")
+            self._says(
+                link,
+                AGAIN,
+                f"right in itself: equal to what stood before the slip of line {broken}",
+            )
             return 0
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
             raise Uncomputed(
-                node, f"no value to compare with {where}: a division by zero, a root of something negative, or numbers too large"
+                node,
+                f"no value to compare with {where}: a division by zero, a root of something "
+                f"negative, or numbers too large",
             )
         if result == IF_POSITIVE:
-            says = f"equal to {where} only for positive letters: declare them in a line of its own before the chain, positive ..."
+            says = (
+                f"equal to {where} only for positive letters: declare them in a line of its "
+                f"own before the chain, positive ..."
+            )
             self._says(link, DIFFERS, says, kinds=("positive",))
             return broken or link.line
         slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
         said = [told(self.setting, slip, link.text, node, above, previous) for slip in slips]
         words = " or ".join(words for words, _ in said)
         places = [at(node, named(node, slip.path)).span for slip in slips if not slip.above]
-        says = f"the line differs from {where}: {words}" if said else UNEXPLAINED.format(above=where)
+        says = (
+            f"the line differs from {where}: {words}" if said else UNEXPLAINED.format(above=where)
+        )
         self._says(
             link,
             DIFFERS,
@@ -235,4 +283,7 @@ class _Chain:
 def _marked(link: Typed, error: FormulaError) -> str:
     place = link.column + error.column
     shown = link.text[max(0, error.column - 60) : error.column + 40]
-    return f"cannot be read at column {place + 1}: {error.problem}\n       {shown}\n       {' ' * min(error.column, 60)}^"
+    return (
+        f"cannot be read at column {place + 1}: {error.problem}\n       {shown}\n       "
+        f"{' ' * min(error.column, 60)}^"
+    )

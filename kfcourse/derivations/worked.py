@@ -1,6 +1,8 @@
-"""Right derivations, written by SymPy: of a structural function, a step a line, for any model that derivations are checked for.
+"""Right derivations, written by SymPy: of a structural function, a step a line, for any model that
+derivations are checked for.
 
-The definition; the equation put in and multiplied out; the means of the noises; the moments of the state; like terms.
+The definition; the equation put in and multiplied out; the means of the noises; the moments of the
+state; like terms.
 """
 
 from __future__ import annotations
@@ -25,14 +27,17 @@ SECONDS = 20.0  # for a derivation
 def stages(
     model: Model, name: str, mean: sp.MatrixBase, cov: sp.MatrixBase, known: Container[str] = ()
 ) -> tuple[list[sp.Expr], GaussianMoments]:
-    """The lines of a derivation of tau, Theta, h, G or F, or of an entry (Theta12), as formulas; and the moments that they use.
+    """The lines of a derivation of tau, Theta, h, G or F, or of an entry (Theta12), as formulas;
+    and the moments that they use.
 
-    M(...) is a mean that is not yet computed; x ~ N(mean, cov), noises are standard.  `known`: names of means that may stand as
-    letters, tau, h2.
+    M(...) is a mean that is not yet computed; x ~ N(mean, cov), noises are standard.  `known`:
+    names of means that may stand as letters, tau, h2.
     """
     side = model.state_equation if name[0] in "tT" else model.meter_equation
     noises = model.v if name[0] in "tT" else model.w
-    law = GaussianMoments([*model.x, *noises], [*mean, *[0] * len(noises)], sp.diag(cov, sp.eye(len(noises))))
+    law = GaussianMoments(
+        [*model.x, *noises], [*mean, *[0] * len(noises)], sp.diag(cov, sp.eye(len(noises)))
+    )
     digits = [int(c) - 1 for c in name if c.isdigit()] or [0]
     a, b = side[digits[0]], side[digits[-1]]
     values: dict[sp.Symbol, sp.Expr] = {}
@@ -52,7 +57,11 @@ def stages(
         outside, inside = term.as_independent(*model.x, *noises, as_Add=False)
         groups[inside] = groups.get(inside, 0) + outside
     split = sp.Add(
-        *(sp.factor(outside) * (1 if inside == 1 else M(inside)) for inside, outside in groups.items()), evaluate=False
+        *(
+            sp.factor(outside) * (1 if inside == 1 else M(inside))
+            for inside, outside in groups.items()
+        ),
+        evaluate=False,
     )
     quiet, closed = sp.S.Zero, sp.S.Zero
     for inside, outside in groups.items():
@@ -77,7 +86,8 @@ class Worked(NamedTuple):
 
 
 def right_derivation(model: Model) -> Worked | None:
-    """A derivation of a model, checked; None where derivations are not checked, or SymPy does not find one.
+    """A derivation of a model, checked; None where derivations are not checked, or SymPy does not
+    find one.
 
     Noises that are not standard, equations that depend on the step or switch: see `of_model`.
     """
@@ -93,7 +103,8 @@ def right_derivation(model: Model) -> Worked | None:
 
 
 def worth_deriving(model: Model) -> str:
-    """Name of the structural function of a model that is worth a derivation: the equation is curved, or its noise depends on x.
+    """Name of the structural function of a model that is worth a derivation: the equation is
+    curved, or its noise depends on x.
 
     Of a scalar model a variance, F or Theta; of others a mean, tau2 or h1, whose formula is short.
     """
@@ -105,9 +116,13 @@ def worth_deriving(model: Model) -> str:
         for i, one in enumerate(equations):
             index = "" if size == 1 else f"{i + 1}"
             curved = bool(sp.Matrix([one.diff(x) for x in model.x]).free_symbols & set(model.x))
-            telling += [(f"{second}{2 * index}" if model.n == 1 else f"{first}{index}")] if curved else []
+            telling += (
+                [(f"{second}{2 * index}" if model.n == 1 else f"{first}{index}")] if curved else []
+            )
             other.append(f"{second}{2 * index}")
-    return next(name for name in (*telling, *other, "h", "tau") if name in of_side(setting, name).meanings)
+    return next(
+        name for name in (*telling, *other, "h", "tau") if name in of_side(setting, name).meanings
+    )
 
 
 def derive(model: Model, name: str) -> str:
@@ -118,7 +133,13 @@ def derive(model: Model, name: str) -> str:
     cov = sp.Matrix([[symbol(one) for one in row] for row in law.cov])
     formulas, _ = stages(model, name, mean, cov, setting.meanings)
     lines = [typed(one) for one in formulas]
-    remarks = ["", "# multiplied out", "# means of the noises", "# moments of the state", "# like terms"]
+    remarks = [
+        "",
+        "# multiplied out",
+        "# means of the noises",
+        "# moments of the state",
+        "# like terms",
+    ]
     if definition := _definition(setting, name):
         lines, remarks = [definition, *lines], ["", "# the equation put in", *remarks[1:]]
     rows = [f"{name} = {lines[0]}"]
@@ -128,13 +149,18 @@ def derive(model: Model, name: str) -> str:
 
 
 def _definition(setting: Setting, name: str) -> str:
-    """That of a variance of the measurement, in the letters y and h; nothing where a parameter has such a letter."""
+    """That of a variance of the measurement, in the letters y and h; nothing where a parameter has
+    such a letter."""
     digits = [c for c in name if c.isdigit()]
     if not name.startswith("F") or len(set(digits)) > 1:
         return ""
     index = digits[0] if digits else ""
     needed = (f"y{index}", f"h{index}")
-    return f"M[({needed[0]} - {needed[1]})^2]" if all(one in setting.meanings for one in needed) else ""
+    return (
+        f"M[({needed[0]} - {needed[1]})^2]"
+        if all(one in setting.meanings for one in needed)
+        else ""
+    )
 
 
 def typed(formula: sp.Expr) -> str:

@@ -8,7 +8,8 @@ structural functions decide which filter it is::
     gaussian(model)                       the normal filter (ГАОФ)
     unscented(model), gauss_hermite(...)  the unscented and quadrature Kalman filters
 
-Stratonovich (1960); Jazwinski (1970); Julier and Uhlmann (2004); all of them as one step: Sarkka and Svensson (2023).
+Stratonovich (1960); Jazwinski (1970); Julier and Uhlmann (2004); all of them as one step: Sarkka
+and Svensson (2023).
 """
 
 from __future__ import annotations

@@ -28,7 +28,8 @@ class State(NamedTuple):
     memory : object
         What else the filter remembers (grid, particles); None for most.
     expected : Measurement, optional
-        What a filter whose laws are normal expected of the last measurement: its likelihood needs no more.
+        What a filter whose laws are normal expected of the last measurement: its likelihood needs
+        no more.
     """
 
     step: int
@@ -45,25 +46,31 @@ class Init(Protocol):
 
 
 class Advance(Protocol):
-    """Correct with y_k, (runs, p), then predict k + 1.  A trajectory whose y is NaN is not corrected."""
+    """Correct with y_k, (runs, p), then predict k + 1.  A trajectory whose y is NaN is not
+    corrected."""
 
     def __call__(self, state: State, y: Vectors, /) -> State: ...
 
 
 class Evidence(Protocol):
-    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0 where it is missing."""
+    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0
+    where it is missing."""
 
     def __call__(self, before: State, y: Vectors, after: State, /) -> Array: ...
 
 
 class LookBack(Protocol):
-    """From the filter's states after each measurement, and y: what so many of these measurements tell, K -> states.
+    """From the filter's states after each measurement, and y: what so many of these measurements
+    tell, K -> states.
 
-    Their laws are those given y_0, ..., y_{K-1}, that of step K - 1 first and of step 0 last, each found when it is asked for.
-    Their memory may tell how good they are, `discretisation_error()`, (runs,), in the units of x.
+    Their laws are those given y_0, ..., y_{K-1}, that of step K - 1 first and of step 0 last, each
+    found when it is asked for. Their memory may tell how good they are, `discretisation_error()`,
+    (runs,), in the units of x.
     """
 
-    def __call__(self, states: Iterable[State], y: Vectors, /) -> Callable[[int], Iterator[State]]: ...
+    def __call__(
+        self, states: Iterable[State], y: Vectors, /
+    ) -> Callable[[int], Iterator[State]]: ...
 
 
 @dataclass(frozen=True)
@@ -79,16 +86,20 @@ class Filter:
     init : Init
         runs -> State.
     step : Advance
-        (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its `posterior`.
+        (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its
+        `posterior`.
     slow : bool
         Thousands of times the cost of the others: comparisons run it on a part of the trajectories.
     structure : Structure, optional
-        For a filter whose laws are normal ones: the structural functions by which it expects measurements from its prediction,
-        and predicts from its posterior.  Looking back, likelihood and gates take from it what no filter needs while it runs.
+        For a filter whose laws are normal ones: the structural functions by which it expects
+        measurements from its prediction, and predicts from its posterior.  Looking back, likelihood
+        and gates take from it what no filter needs while it runs.
     evidence : Evidence, optional
-        Where it is another than the normal law's by `structure`: how likely a measurement was before it came.
+        Where it is another than the normal law's by `structure`: how likely a measurement was
+        before it came.
     look_back : LookBack, optional
-        Where it is another than the normal law's by `structure`: what the whole record tells of each state.
+        Where it is another than the normal law's by `structure`: what the whole record tells of
+        each state.
     """
 
     name: str
@@ -106,18 +117,25 @@ class Filter:
 
 
 def structure_of(one: Filter, what: str) -> Structure:
-    """The structural functions of a filter; ValueError that tells what needs them if it has none."""
+    """The structural functions of a filter; ValueError that tells what needs them if it has
+    none."""
     if one.structure is None:
         raise ValueError(
-            f"{what} needs the structural functions by which a filter expects and predicts, and {one.name} has none of its own: "
-            "take one whose laws are normal, such as aof(linearised(model)), aof(unscented(model)) or kalman_filter(model)"
+            f"{what} needs the structural functions by which a filter expects and predicts, and "
+            f"{one.name} has none of its own: "
+            "take one whose laws are normal, such as aof(linearised(model)), "
+            "aof(unscented(model)) or kalman_filter(model)"
         )
     return one.structure
 
 
 def unknown_error(one: Filter) -> ValueError:
-    """What is raised where a filter is asked how far its laws are from the true ones, and cannot tell."""
-    return ValueError(f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)")
+    """What is raised where a filter is asked how far its laws are from the true ones, and cannot
+    tell."""
+    return ValueError(
+        f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, "
+        f"or particle(model)"
+    )
 
 
 def _on_circle(step: Advance, angles: Components) -> Advance:
@@ -130,7 +148,9 @@ def with_angles_on_circle(state: State, angles: Components) -> State:
     """The state with the angles of its means between -pi and pi."""
     if not angles:
         return state
-    posterior, predicted = (Gaussian(on_circle(law.mean, angles), law.cov) for law in (state.posterior, state.predicted))
+    posterior, predicted = (
+        Gaussian(on_circle(law.mean, angles), law.cov) for law in (state.posterior, state.predicted)
+    )
     return state._replace(posterior=posterior, predicted=predicted)
 
 

@@ -1,7 +1,8 @@
 """Pugachev's two-step conditionally optimal filter (DUOF, ДУОФ).
 
 The structure of both steps is given, taken from the model itself, and the coefficients minimise the
-mean square error at each step over the ensemble: two affine regressions.  Pugachev (1979); Pugachev and Sinitsyn (1987).
+mean square error at each step over the ensemble: two affine regressions.  Pugachev (1979); Pugachev
+and Sinitsyn (1987).
 """
 
 from __future__ import annotations
@@ -35,12 +36,13 @@ EQUATIONS = (
 def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> Design:
     """The two-step conditionally optimal filter.
 
-    omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: regression of x - lambda on omega
-    alpha = a(z, m_v),            lambda' = F alpha + g          F, g: regression of x' on alpha
+    omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: regression of x - lambda on
+    omega alpha = a(z, m_v),            lambda' = F alpha + g          F, g: regression of x' on
+    alpha
 
-    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble, whether y came or not.  A
-    measurement of which a component is missing corrects nothing: H is that of whole ones.  Given `equations` take the place of
-    a(z, m_v) and b(lambda, m_w).
+    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble,
+    whether y came or not.  A measurement of which a component is missing corrects nothing: H is
+    that of whole ones.  Given `equations` take the place of a(z, m_v) and b(lambda, m_w).
     """
     expect(model, Model, "duof")
     (a, b), angles = equations or compile_noiseless(model), model.angles

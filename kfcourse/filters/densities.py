@@ -1,9 +1,11 @@
-"""Conditional densities of a model whose noises enter linearly: what exact and particle filters need.
+"""Conditional densities of a model whose noises enter linearly: what exact and particle filters
+need.
 
 x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
 
-A meter whose noise enters nonlinearly but can be solved for, such as y = exp(x + w) or y = x*exp(w), has
-with w = omega(x, y) the density p(y | x) = phi(omega(x, y)) |d omega / dy|, phi that of N(m_w, D_w).
+A meter whose noise enters nonlinearly but can be solved for, such as y = exp(x + w) or y =
+x*exp(w), has with w = omega(x, y) the density p(y | x) = phi(omega(x, y)) |d omega / dy|, phi that
+of N(m_w, D_w).
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
-TRIALS, ROUNDING = 50, 1e-12  # states on which formulas are tried; eigenvalue of correlations that is none
+# states on which formulas are tried; eigenvalue of correlations that is none
+TRIALS, ROUNDING = 50, 1e-12
 DIGITS = 1e-6  # of a noise's deviation, to which a solution must give the noise back
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 Y = sp.Dummy("y", real=True)
@@ -30,16 +33,18 @@ REMEDY = "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
 
 
 class LogLikelihood(Protocol):
-    """(y (..., p), x (..., n)) -> log p(y | x) (...); of a model that depends on the step, at step k."""
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); of a model that depends on the step, at step
+    k."""
 
     def __call__(self, y: Array, x: Array, k: int | None = None) -> Array: ...
 
 
 class ScalarFormulas(NamedTuple):
-    """Means and deviations of the next state and of the measurement, given x: formulas of x and parameters.
+    """Means and deviations of the next state and of the measurement, given x: formulas of x and
+    parameters.
 
-    Of a meter whose noise is solved for, those of y with ln p(y | x) = -(y - mean)^2 / (2 deviation^2) -
-    ln(sqrt(2 pi) deviation): they contain y, the symbol `Y`.
+    Of a meter whose noise is solved for, those of y with ln p(y | x) = -(y - mean)^2 / (2
+    deviation^2) - ln(sqrt(2 pi) deviation): they contain y, the symbol `Y`.
     """
 
     mean: sp.Expr
@@ -49,13 +54,17 @@ class ScalarFormulas(NamedTuple):
 
 
 def scalar_formulas(model: Model) -> ScalarFormulas:
-    """Both laws of a model of one state and one measurement; ModelError for another, or without a noise."""
+    """Both laws of a model of one state and one measurement; ModelError for another, or without a
+    noise."""
     if model.n != 1 or model.p != 1:
         raise ModelError(
-            f"the exact filter is for scalar models: the state has dimension {model.n}, the measurement {model.p}: "
+            f"the exact filter is for scalar models: the state has dimension {model.n}, the "
+            f"measurement {model.p}: "
             "use particle(model)"
         )
-    mean, variance = _law(model, "object", model.difference_equation("a density"), model.v, model.state_noise)
+    mean, variance = _law(
+        model, "object", model.difference_equation("a density"), model.v, model.state_noise
+    )
     if omega := noise_of_meter(model):
         z = (omega - model.meter_noise.mean[0]) / sp.Float(np.sqrt(model.meter_noise.cov[0, 0]))
         deviation = 1 / sp.Abs(z.diff(Y))
@@ -65,7 +74,8 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
 
 
 def transition(model: Model) -> Callable[..., Gaussian]:
-    """x (..., n), and the step if the model has one -> law of the next state; ModelError if there is none."""
+    """x (..., n), and the step if the model has one -> law of the next state; ModelError if there
+    is none."""
     law = _compiled(
         model,
         "transition",
@@ -75,16 +85,21 @@ def transition(model: Model) -> Callable[..., Gaussian]:
 
 
 def likelihood(model: Model) -> LogLikelihood:
-    """(y (..., p), x (..., n)) -> log p(y | x) (...); what of y is missing (NaN) does not enter, 0 where all is.
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); what of y is missing (NaN) does not enter, 0
+    where all is.
 
-    The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
+    The law of a component that is an angle is wound around the circle: the densities of y and of y
+    plus whole turns add up.
     """
     if omega := noise_of_meter(model):
         return _of_solved(model, omega)
-    law = _compiled(model, "likelihood", _law(model, "meter", model.meter_equation, model.w, model.meter_noise))
+    law = _compiled(
+        model, "likelihood", _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
+    )
     if model.p > 1 and _singular(law, model):
         raise _no_density(
-            f"{list(model.meter_equation)}: the noises of these components depend on one another, so a combination of them has "
+            f"{list(model.meter_equation)}: the noises of these components depend on one another, "
+            f"so a combination of them has "
             f"no noise and there is no likelihood density; leave a component out, or {REMEDY}"
         )
 
@@ -94,12 +109,20 @@ def likelihood(model: Model) -> LogLikelihood:
         sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
         either = missing[..., :, None] | missing[..., None, :]
         if missing.any():
-            innovation, cov = np.where(missing, 0.0, innovation), np.where(either, np.eye(model.p), cov)
+            innovation, cov = (
+                np.where(missing, 0.0, innovation),
+                np.where(either, np.eye(model.p), cov),
+            )
 
-        def of_present(turns: Array) -> Array:  # what is missing is counted once, in no turn, as N(0; 0, 1)
-            return np.where((missing & (turns != 0)).any(axis=-1), -np.inf, log_normal(innovation + turns, cov))
+        # what is missing is counted once, in no turn, as N(0; 0, 1)
+        def of_present(turns: Array) -> Array:
+            return np.where(
+                (missing & (turns != 0)).any(axis=-1), -np.inf, log_normal(innovation + turns, cov)
+            )
 
-        value = wound(of_present, sd, model.angles.y) + 0.5 * np.log(2 * np.pi) * missing.sum(axis=-1)
+        value = wound(of_present, sd, model.angles.y) + 0.5 * np.log(2 * np.pi) * missing.sum(
+            axis=-1
+        )
         return np.where(missing.all(axis=-1), 0.0, value)
 
     return log_likelihood
@@ -108,7 +131,8 @@ def likelihood(model: Model) -> LogLikelihood:
 def log_normal(innovation: Array, cov: Array) -> Array:
     """ln N(innovation; 0, cov), (...), of innovations (..., p)."""
     size = innovation.shape[-1]
-    with np.errstate(over="ignore"):  # an innovation infinitely many sigmas away has log-density -inf
+    # an innovation infinitely many sigmas away has log-density -inf
+    with np.errstate(over="ignore"):
         if size == 1:
             variance = np.maximum(cov[..., 0, 0], TINY)
             return -0.5 * (innovation[..., 0] ** 2 / variance + np.log(2 * np.pi * variance))
@@ -117,7 +141,8 @@ def log_normal(innovation: Array, cov: Array) -> Array:
 
 
 def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) -> Array:
-    """log of the density of angles: the sum over all turns (p,) of the density of what was measured plus these turns.
+    """log of the density of angles: the sum over all turns (p,) of the density of what was measured
+    plus these turns.
 
     Eight standard deviations (p,) are covered, and one turn at least.
     """
@@ -125,7 +150,9 @@ def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) 
         return log_density(np.zeros(len(sd)))
     most = np.clip(np.ceil((8 * sd + np.pi) / TURN), 1, MOST_TURNS).astype(int)
     total = np.array(-np.inf)
-    for numbers in cartesian(*(range(-most[i], most[i] + 1) if i in angles else (0,) for i in range(len(sd)))):
+    for numbers in cartesian(
+        *(range(-most[i], most[i] + 1) if i in angles else (0,) for i in range(len(sd)))
+    ):
         total = np.logaddexp(total, log_density(TURN * np.array(numbers)))
     return total
 
@@ -133,15 +160,25 @@ def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) 
 def _law(
     model: Model, what: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian
 ) -> tuple[sp.MatrixBase, sp.MatrixBase]:
-    """Mean and covariance of what an equation gives, as formulas; ModelError if they are not those of a density."""
+    """Mean and covariance of what an equation gives, as formulas; ModelError if they are not those
+    of a density."""
     B = equation.jacobian(sp.Matrix(noise))
-    decided = any(condition.has(*noise) for choice in equation.atoms(sp.Piecewise) for _, condition in choice.args)
+    decided = any(
+        condition.has(*noise)
+        for choice in equation.atoms(sp.Piecewise)
+        for _, condition in choice.args
+    )
     if B.has(*noise) or decided:
-        raise _no_density(f"{list(equation)}: the noise enters nonlinearly, so there is no simple density; {REMEDY}")
+        raise _no_density(
+            f"{list(equation)}: the noise enters nonlinearly, so there is no simple density; "
+            f"{REMEDY}"
+        )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     if cov.subs(model.values).is_zero_matrix:
-        raise _no_density(f"{list(equation)}: no noise enters the {what}, so there is no density; {REMEDY}")
+        raise _no_density(
+            f"{list(equation)}: no noise enters the {what}, so there is no density; {REMEDY}"
+        )
     return mean, cov
 
 
@@ -152,7 +189,8 @@ def _compiled(model: Model, name: str, law: tuple[sp.MatrixBase, sp.MatrixBase])
 
 
 def _singular(law: Stepwise, model: Model) -> bool:
-    """Whether the covariance is singular at all states tried: the determinant of long formulas takes SymPy minutes."""
+    """Whether the covariance is singular at all states tried: the determinant of long formulas
+    takes SymPy minutes."""
     with np.errstate(all="ignore"):
         cov = law.at(0)(_states(model))[1]
         deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
@@ -168,12 +206,15 @@ def _states(model: Model) -> Array:
 
 def has_object_noise(model: Model) -> bool:
     """Whether any noise enters the object."""
-    B = model.difference_equation("a density").jacobian(sp.Matrix(model.v)) * exact_matrix(model.state_noise.cov)
+    B = model.difference_equation("a density").jacobian(sp.Matrix(model.v)) * exact_matrix(
+        model.state_noise.cov
+    )
     return not B.subs(model.values).is_zero_matrix
 
 
 def noise_of_meter(model: Model) -> sp.Expr | None:
-    """omega(x, Y), the noise of a scalar meter in which it enters nonlinearly; None if it is linear or not to be had.
+    """omega(x, Y), the noise of a scalar meter in which it enters nonlinearly; None if it is linear
+    or not to be had.
 
     SymPy solves; which of its solutions is the noise, trials tell.
     """
@@ -194,7 +235,8 @@ def noise_of_meter(model: Model) -> sp.Expr | None:
             with np.errstate(all="ignore"):
                 y = sp.lambdify([*model.x, w], equation)(*states, noises)
                 back = sp.lambdify([*model.x, Y], solution)(*states, y)
-        except (NameError, TypeError):  # a solution that cannot be computed, such as Lambert's function
+        # a solution that cannot be computed, such as Lambert's function
+        except (NameError, TypeError):
             continue
         if not solution.has(sp.I) and np.all(np.abs(back - noises) <= DIGITS * deviation):
             return solution

@@ -1,9 +1,11 @@
-"""Filters of given structure whose coefficients are regressions over an ensemble (DUOF, FOS and their kin).
+"""Filters of given structure whose coefficients are regressions over an ensemble (DUOF, FOS and
+their kin).
 
-The equations of such a filter are written once, as a generator that yields each `Regression` it needs and receives the
-fitted `Affine`.  While it is designed the ensemble answers, through the `Scatter` of its trajectories
-(`kfcourse.montecarlo.designing`); while it runs, the stored coefficients do.  Both steps of a filter may end in one:
-`fitted_correction`, `fitted_prediction`.
+The equations of such a filter are written once, as a generator that yields each `Regression` it
+needs and receives the
+fitted `Affine`.  While it is designed the ensemble answers, through the `Scatter` of its
+trajectories (`kfcourse.montecarlo.designing`); while it runs, the stored coefficients do.  Both
+steps of a filter may end in one: `fitted_correction`, `fitted_prediction`.
 """
 
 from __future__ import annotations
@@ -49,15 +51,19 @@ class Scatter(NamedTuple):
     @classmethod
     def of(cls, target: Array, regressor: Array) -> Scatter:
         """Those of target (N, r) and regressor (N, s) stacked into one vector."""
-        size, both = len(target), np.concatenate([target.T, regressor.T])  # sums run along rows of numbers
+        # sums run along rows of numbers
+        size, both = len(target), np.concatenate([target.T, regressor.T])
         mean = both.sum(axis=1) / max(size, 1)
         off = both - mean[:, None]
-        return cls(size, target.shape[1], mean, np.einsum("in,jn->ij", off, off))  # no thread of a library is started
+        # no thread of a library is started
+        return cls(size, target.shape[1], mean, np.einsum("in,jn->ij", off, off))
 
     def regression(self, targets: int | None = None) -> Affine:
-        """Least squares of the targets on the rest; notebooks handed out with earlier versions also say how many there are.
+        """Least squares of the targets on the rest; notebooks handed out with earlier versions also
+        say how many there are.
 
-        `matrix` = Cov(t, r) Cov(r)^+,  `offset` = M[t] - `matrix` M[r],  `residual` = Cov(t) - `matrix` Cov(t, r)^T
+        `matrix` = Cov(t, r) Cov(r)^+,  `offset` = M[t] - `matrix` M[r],  `residual` = Cov(t) -
+        `matrix` Cov(t, r)^T
         """
         cov, r = self.scatter / self.size, self.targets if targets is None else targets
         cross = cov[:r, r:]
@@ -92,7 +98,8 @@ class Regression(NamedTuple):
     mode: int | None = None
 
     def scatter(self, x: Array, x_next: Array, modes: Array | None = None) -> Scatter:
-        """The moments over a part of the ensemble, which in a model that jumps is in these modes (N,)."""
+        """The moments over a part of the ensemble, which in a model that jumps is in these modes
+        (N,)."""
         target, regressor = self.target(x, x_next), self.regressor
         if self.mode is not None and modes is not None:
             target, regressor = target[modes == self.mode], regressor[modes == self.mode]
@@ -104,7 +111,8 @@ Part = Generator[Regression, Affine, Gaussian]
 
 
 def fitted_correction(lam: Array, direction: Array, y: Array, angles: Angles) -> Part:
-    """z = lambda + H direction + e, H and e from the regression of x - lambda on the direction; p is its residual.
+    """z = lambda + H direction + e, H and e from the regression of x - lambda on the direction; p
+    is its residual.
 
     Where a component of y is missing (NaN) z is lambda.
     """
@@ -127,7 +135,8 @@ class Design:
     name : str
     model : Model
     equations : callable
-        (State, y) -> generator of one step: yields `Regression`, receives `Affine`, returns the next `State`.
+        (State, y) -> generator of one step: yields `Regression`, receives `Affine`, returns the
+        next `State`.
     start : Init, optional
         For a filter that carries more than a prediction: the state before the first measurement.
     structure : Structure, optional
@@ -147,13 +156,15 @@ class Design:
         return self.start or initial_state(self.model)
 
     def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
-        """The filter with the coefficients of every step, in the order the equations ask for them."""
+        """The filter with the coefficients of every step, in the order the equations ask for
+        them."""
         steps = [self.answered(tuple(fits)) for fits in coefficients]
 
         def step(state: State, y: Vectors) -> State:
             if state.step >= len(steps):
                 raise ValueError(
-                    f"{self.name} was designed for {len(steps)} steps; design it with more to run step {state.step + 1}"
+                    f"{self.name} was designed for {len(steps)} steps; design it with more to run "
+                    f"step {state.step + 1}"
                 )
             return steps[state.step](state, y)
 

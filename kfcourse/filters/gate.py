@@ -1,13 +1,16 @@
-r"""A gate before a filter: measurements too far from what it expects are refused, and a track that is lost is found again.
+r"""A gate before a filter: measurements too far from what it expects are refused, and a track that
+is lost is found again.
 
-If the filter is right, the square of its innovation in units of its covariance F is chi-squared with p degrees of freedom,
+If the filter is right, the square of its innovation in units of its covariance F is chi-squared
+with p degrees of freedom,
 
     nu^T F^-1 nu <= gamma,      P(chi^2_p <= gamma) = `probability`
 
-and a measurement beyond gamma is taken for a fault and treated as missing.  That has a danger of its own.  Where the object has
-done what the model does not know of, every measurement lies beyond the gate, the filter refuses them all, and never hears that
-it is wrong.  So patience ends: after some refusals in a row the prediction is widened until the state alone explains the last
-innovation, and the next measurement is let through whatever it is,
+and a measurement beyond gamma is taken for a fault and treated as missing.  That has a danger of
+its own.  Where the object has done what the model does not know of, every measurement lies beyond
+the gate, the filter refuses them all, and never hears that it is wrong.  So patience ends: after
+some refusals in a row the prediction is widened until the state alone explains the last innovation,
+and the next measurement is let through whatever it is,
 
     Psi -> s Psi,      s = max(1, nu^T (G Psi G^T)^+ nu / p)
 
@@ -44,7 +47,8 @@ class Gate(NamedTuple):
     Attributes
     ----------
     weight : ndarray (runs,)
-        Of the last measurement: 1, or 0 if it was refused, or the part of its components that passed; NaN where there was none.
+        Of the last measurement: 1, or 0 if it was refused, or the part of its components that
+        passed; NaN where there was none.
     in_a_row : ndarray of int (runs,)
         How many were refused, with all their components, since the last that was not.
     passed : ndarray of bool (runs, p)
@@ -75,26 +79,30 @@ def gated(
     probability : float
         With which the gate lets a measurement pass if the filter is right.
     patience : int, optional
-        After so many refusals in a row the track counts as lost, and the prediction is widened; None: never.  A filter that goes
-        on from a memory (modes, particles, a grid) hears nothing of that: the next measurement passes, but moves it little.
+        After so many refusals in a row the track counts as lost, and the prediction is widened;
+        None: never.  A filter that goes on from a memory (modes, particles, a grid) hears nothing
+        of that: the next measurement passes, but moves it little.
     structure : Structure, optional
-        By which the gate knows what to expect, from the filter's prediction N(lambda, Psi); the filter's own by default.
+        By which the gate knows what to expect, from the filter's prediction N(lambda, Psi); the
+        filter's own by default.
     by_component : bool
-        Judge each component of a measurement for itself, nu_i^2 <= gamma F_ii with one degree of freedom: a fault of one sensor
-        does not cost the others' components of the same row.
+        Judge each component of a measurement for itself, nu_i^2 <= gamma F_ii with one degree of
+        freedom: a fault of one sensor does not cost the others' components of the same row.
 
     Returns
     -------
     Filter
-        `state.memory` is a `Gate`; `kfcourse.records.weights` tells for a whole record what was refused.  In its likelihood
-        a refused measurement counts as one at the gate's edge.
+        `state.memory` is a `Gate`; `kfcourse.records.weights` tells for a whole record what was
+        refused.  In its likelihood a refused measurement counts as one at the gate's edge.
 
     Raises
     ------
     TypeError
-        No filter: a `Design`, whose coefficients are still to be found, a model, or structural functions.
+        No filter: a `Design`, whose coefficients are still to be found, a model, or structural
+        functions.
     ValueError
-        A probability or a patience that is none; a filter without structural functions of its own, and no `structure`.
+        A probability or a patience that is none; a filter without structural functions of its own,
+        and no `structure`.
 
     Examples
     --------
@@ -102,22 +110,30 @@ def gated(
     >>> from kfcourse import Model, run
     >>> from kfcourse.filters import gated, kalman_filter
     >>> one = kalman_filter(Model.define("x + 0.1*v", "x + w"))
-    >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one, gated(one))]
-    [23.247, 0.033]
+    >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one,
+    gated(one))] [23.247, 0.033]
     """
     expect(one, Filter, "gated")
     if structure is not None:
         expect(structure, Structure, "structure=")
     if not 0 < probability < 1:
         raise ValueError(f"probability must lie between 0 and 1, got {probability!r}")
-    if patience is not None and (isinstance(patience, bool) or not isinstance(patience, int | np.integer) or patience < 1):
-        raise ValueError(f"patience must be a whole number of refusals, at least 1, or None for no end of it; got {patience!r}")
+    if patience is not None and (
+        isinstance(patience, bool) or not isinstance(patience, int | np.integer) or patience < 1
+    ):
+        raise ValueError(
+            f"patience must be a whole number of refusals, at least 1, or None for no end of it; "
+            f"got {patience!r}"
+        )
     expecting = structure or structure_of(one, "a gate")
     # For 0, ..., p components measured; with none there is nothing to refuse.
-    limits = np.array([np.inf, *scipy.special.chdtri(np.arange(1, one.model.p + 1), 1 - probability)])
+    limits = np.array(
+        [np.inf, *scipy.special.chdtri(np.arange(1, one.model.p + 1), 1 - probability)]
+    )
 
     def judged(state: State, y: Array) -> tuple[Measurement, Array, Array, Array]:
-        """What was expected; squares of innovations, gamma, whether they are beyond and the track not lost: (runs, p or 1)."""
+        """What was expected; squares of innovations, gamma, whether they are beyond and the track
+        not lost: (runs, p or 1)."""
         expected = expecting.at(state.step).measure(*state.predicted)
         if by_component:
             variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
@@ -130,19 +146,27 @@ def gated(
     def init(runs: int) -> State:
         state = one.init(runs)
         nothing = np.zeros((runs, one.model.p), dtype=bool)
-        return state._replace(memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), nothing, state.memory))
+        return state._replace(
+            memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), nothing, state.memory)
+        )
 
     def step(state: State, y: Array) -> State:
         expected, _, _, beyond = judged(state, y)
         after = one.step(state._replace(memory=state.memory.inner), np.where(beyond, np.nan, y))
         measured = ~np.isnan(y)
         passed, missing = measured & ~beyond, ~measured.any(axis=-1)
-        weight = np.where(missing, np.nan, passed.sum(axis=-1) / np.maximum(measured.sum(axis=-1), 1))
+        weight = np.where(
+            missing, np.nan, passed.sum(axis=-1) / np.maximum(measured.sum(axis=-1), 1)
+        )
         refused = weight == 0
-        in_a_row = np.where(missing, state.memory.in_a_row, np.where(refused, state.memory.in_a_row + 1, 0))
+        in_a_row = np.where(
+            missing, state.memory.in_a_row, np.where(refused, state.memory.in_a_row + 1, 0)
+        )
         if patience is not None and (losing := refused & (in_a_row == patience)).any():
             wider = np.where(losing, _widening(expected, state.predicted, y), 1.0)
-            after = after._replace(predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None]))
+            after = after._replace(
+                predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None])
+            )
         return after._replace(memory=Gate(weight, in_a_row, passed, after.memory))
 
     def evidence(before: State, y: Array, after: State) -> Array:
@@ -150,11 +174,15 @@ def gated(
         if not by_component:
             return log_density(expected, y) + 0.5 * np.where(beyond, size - limit, 0.0)[:, 0]
         variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
-        at_the_edge = -0.5 * np.where(beyond, limit + np.log(2 * np.pi * variances), 0.0).sum(axis=-1)
+        at_the_edge = -0.5 * np.where(beyond, limit + np.log(2 * np.pi * variances), 0.0).sum(
+            axis=-1
+        )
         return log_density(expected, np.where(beyond, np.nan, y)) + at_the_edge
 
     # a way of its own to look back needs its own memories, not those of the gate
-    return replace(one, name=f"gated-{one.name}", init=init, step=step, evidence=evidence, look_back=None)
+    return replace(
+        one, name=f"gated-{one.name}", init=init, step=step, evidence=evidence, look_back=None
+    )
 
 
 def _size(expected: Measurement, y: Array) -> Array:

@@ -1,17 +1,19 @@
 """The iterated filter: linearise the meter again, where the measurement has moved the estimate.
 
-The Gaussian-approximated AOF takes the structural functions of the meter at the prediction.  After the
-correction a better place is known.  The iterated filter takes them there, and corrects the *same prediction*
-anew with the affine meter that they describe,
+The Gaussian-approximated AOF takes the structural functions of the meter at the prediction.  After
+the correction a better place is known.  The iterated filter takes them there, and corrects the
+*same prediction* anew with the affine meter that they describe,
 
     y = h + G (x - z) + e,   Cov(e) = R = F - G p G^T,        h, G, F at (z, p)
 
-With `linearised(model)` each round is a step of Gauss and Newton's method towards the maximum of the posterior density,
+With `linearised(model)` each round is a step of Gauss and Newton's method towards the maximum of
+the posterior density,
 
     1/2 (x - lambda)^T Psi^-1 (x - lambda) + 1/2 (y - S(x))^T D_n^-1 (y - S(x))  ->  min,
 
-the classical iterated extended Kalman filter (Bell and Cathey, 1993); with the moment structures it is the iterated
-posterior linearisation filter (Garcia-Fernandez, Svensson, Morelande, Sarkka, 2015).
+the classical iterated extended Kalman filter (Bell and Cathey, 1993); with the moment structures it
+is the iterated posterior linearisation filter (Garcia-Fernandez, Svensson, Morelande, Sarkka,
+2015).
 """
 
 from __future__ import annotations
@@ -22,14 +24,28 @@ from kfcourse.angles import Components, difference
 from kfcourse.errors import expect
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, symmetric, transpose
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Measurement,
+    apply,
+    correct,
+    product,
+    symmetric,
+    transpose,
+)
 from kfcourse.symbolic.structure import Structure
 
 _z_i, _P_i = s.matrix(r"z^{(i)}", s.n, s.ONE), s.matrix(r"p^{(i)}", s.n, s.n)
 _z_next, _P_next = s.matrix(r"z^{(i+1)}", s.n, s.ONE), s.matrix(r"p^{(i+1)}", s.n, s.n)
 _h_i, _G_i, _F_i, _K_i = (
     s.matrix(rf"{letter}^{{(i)}}", *shape)
-    for letter, shape in (("h", (s.p, s.ONE)), ("G", (s.p, s.n)), ("F", (s.p, s.p)), ("K", (s.n, s.p)))
+    for letter, shape in (
+        ("h", (s.p, s.ONE)),
+        ("G", (s.p, s.n)),
+        ("F", (s.p, s.p)),
+        ("K", (s.n, s.p)),
+    )
 )
 _R_i = s.matrix(r"R^{(i)}", s.p, s.p)
 _at = r"(z^{(i)}, p^{(i)})"
@@ -56,13 +72,15 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
     ----------
     structure : Structure
     iterations : int
-        Rounds of the correction.  1 is `aof(structure)`.  The rounds are not damped: where a measurement is far sharper
-        than the curvature of the meter allows, they may jump about instead of settling.
+        Rounds of the correction.  1 is `aof(structure)`.  The rounds are not damped: where a
+        measurement is far sharper than the curvature of the meter allows, they may jump about
+        instead of settling.
 
     Returns
     -------
     Filter
-        Its covariance p (runs, n, n) is that of the last affine meter.  A missing measurement (NaN) leaves the prediction.
+        Its covariance p (runs, n, n) is that of the last affine meter.  A missing measurement (NaN)
+        leaves the prediction.
 
     Raises
     ------
@@ -80,8 +98,15 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
     [3.331, 2.461, 2.0]
     """
     expect(structure, Structure, "iterated")
-    if isinstance(iterations, bool) or not isinstance(iterations, int | np.integer) or iterations < 1:
-        raise ValueError(f"iterations must be a whole number, at least 1 (which is aof(structure)); got {iterations!r}")
+    if (
+        isinstance(iterations, bool)
+        or not isinstance(iterations, int | np.integer)
+        or iterations < 1
+    ):
+        raise ValueError(
+            f"iterations must be a whole number, at least 1 (which is aof(structure)); got "
+            f"{iterations!r}"
+        )
 
     def step(state: State, y: Array) -> State:
         prior, now = state.predicted, structure.at(state.step)
@@ -91,22 +116,33 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
             posterior = correct(prior, *affine_meter(now, posterior, prior, y))
         return State(state.step + 1, posterior, now.predict(*posterior), expected=expected)
 
-    return Filter(f"iterated-{structure.name}", structure.model, initial_state(structure.model), step, structure=structure)
+    return Filter(
+        f"iterated-{structure.name}",
+        structure.model,
+        initial_state(structure.model),
+        step,
+        structure=structure,
+    )
 
 
-def affine_meter(structure: Structure, at: Gaussian, prior: Gaussian, y: Array) -> tuple[Measurement, Array]:
-    """The meter's structural functions at the law `at`, as those of an affine meter seen from the law `prior`; and y.
+def affine_meter(
+    structure: Structure, at: Gaussian, prior: Gaussian, y: Array
+) -> tuple[Measurement, Array]:
+    """The meter's structural functions at the law `at`, as those of an affine meter seen from the
+    law `prior`; and y.
 
     h + G (lambda - z),  G,  G Psi G^T + R,  R
 
-    Components of y that are angles get the turns that bring them near h: at z, where the meter is affine, not at lambda.
+    Components of y that are angles get the turns that bring them near h: at z, where the meter is
+    affine, not at lambda.
     """
     there, angles = structure.measure(*at), structure.model.angles
     return seen_from(there, at, prior, angles.x), there.h + there.innovation(y) if angles.y else y
 
 
 def seen_from(there: Measurement, at: Gaussian, prior: Gaussian, angles: Components) -> Measurement:
-    """The affine meter that structural functions at the law `at` describe, seen from another law: without the turns of y."""
+    """The affine meter that structural functions at the law `at` describe, seen from another law:
+    without the turns of y."""
     h, G, _, R = there
     F = symmetric(product(product(G, prior.cov), transpose(G))) + R
     return Measurement(h + apply(G, difference(prior.mean, at.mean, angles)), G, F, R)

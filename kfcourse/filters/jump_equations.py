@@ -1,4 +1,5 @@
-r"""The equations of the logic-dynamic filter (`multiple_models`) for a mode j of so many, in SymPy: to print and to execute.
+r"""The equations of the logic-dynamic filter (`multiple_models`) for a mode j of so many, in SymPy:
+to print and to execute.
 
 j may be a letter, as it is printed, or a number; sums over the modes are written out.
 """
@@ -47,7 +48,9 @@ def correction(j: object, size: int) -> tuple[sp.Eq, ...]:
     h, K = s.matrix(of("h", j), s.p, s.ONE), s.matrix(of("K", j), s.n, s.p)
     G, F = s.matrix(of("G", j), s.p, s.n), s.matrix(of("F", j), s.p, s.p)
     at = rf"({lam.name}, {Psi.name})"
-    values = [s.matrix(rf"{name}^{{{j}}}{at}", *one.shape) for name, one in (("h", h), ("G", G), ("F", F))]
+    values = [
+        s.matrix(rf"{name}^{{{j}}}{at}", *one.shape) for name, one in (("h", h), ("G", G), ("F", F))
+    ]
     total = sp.Add(*(number("c", i) * likelihood(i) for i in range(1, size + 1)), evaluate=False)
     return (
         *(s.equation(one, value) for one, value in zip((h, G, F), values, strict=True)),
@@ -62,7 +65,8 @@ def combination(j: object, size: int) -> tuple[sp.Eq, ...]:
     """The estimate, how far the law of mode j is from it, and the covariance."""
     modes = range(1, size + 1)
     mu, z, p, delta = (
-        [make(name, i) for i in modes] for make, name in ((number, r"\mu"), (vector, "z"), (square, "p"), (vector, r"\delta"))
+        [make(name, i) for i in modes]
+        for make, name in ((number, r"\mu"), (vector, "z"), (square, "p"), (vector, r"\delta"))
     )
     spread = [one + away * away.T for one, away in zip(p, delta, strict=True)]
     return (
@@ -73,7 +77,8 @@ def combination(j: object, size: int) -> tuple[sp.Eq, ...]:
 
 
 def prediction(j: object, size: int) -> tuple[sp.Eq, ...]:
-    """The probability of mode j at the next step, what leads to it, and the law of the state there."""
+    """The probability of mode j at the next step, what leads to it, and the law of the state
+    there."""
     modes = range(1, size + 1)
     mu, c = [number(r"\mu", i) for i in modes], number("c", j, "k+1")
     pi, w = ([sp.Symbol(rf"{name}^{{{i}{j}}}") for i in modes] for name in (r"\pi", "w"))
@@ -81,10 +86,15 @@ def prediction(j: object, size: int) -> tuple[sp.Eq, ...]:
     laws, away = [ahead(j, i) for i in modes], [vector(r"\delta", f"{i}{j}", "k+1") for i in modes]
     return (
         s.equation(c, sp.Add(*(one * weight for one, weight in zip(pi, mu, strict=True)))),
-        *(s.equation(share, one * weight / c) for share, one, weight in zip(w, pi, mu, strict=True)),
+        *(
+            s.equation(share, one * weight / c)
+            for share, one, weight in zip(w, pi, mu, strict=True)
+        ),
         s.equation(lam, _sum(w, [tau for tau, _ in laws])),
         *(s.equation(one, tau - lam) for one, (tau, _) in zip(away, laws, strict=True)),
-        s.equation(Psi, _sum(w, [Theta + one * one.T for one, (_, Theta) in zip(away, laws, strict=True)])),
+        s.equation(
+            Psi, _sum(w, [Theta + one * one.T for one, (_, Theta) in zip(away, laws, strict=True)])
+        ),
     )
 
 

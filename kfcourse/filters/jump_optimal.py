@@ -1,12 +1,16 @@
-r"""Logic-dynamic filters of optimal structure: what a memory tells of state and mode, found off-line.
+r"""Logic-dynamic filters of optimal structure: what a memory tells of state and mode, found
+off-line.
 
-Such a filter of a model that jumps carries no covariances and no probabilities from step to step, but zeta_k only (`Memory`).
-Before it predicts it asks what zeta_k says of the state in each mode i, and of the mode, over the trajectories in mode i:
+Such a filter of a model that jumps carries no covariances and no probabilities from step to step,
+but zeta_k only (`Memory`). Before it predicts it asks what zeta_k says of the state in each mode i,
+and of the mode, over the trajectories in mode i:
 
-    u_i = Gamma_i zeta + chi_i  with residual covariance T_i          regression of x_k on zeta_k, given i_k = i
+    u_i = Gamma_i zeta + chi_i  with residual covariance T_i
+        regression of x_k on zeta_k, given i_k = i
     xi_i ∝ q_i N(zeta; M[zeta | i], Cov(zeta | i))
 
-and (xi_i, u_i, T_i) take the place of (mu_i, z_i, p_i) in the prediction of the logic-dynamic AOF (`multiple_models`).
+and (xi_i, u_i, T_i) take the place of (mu_i, z_i, p_i) in the prediction of the logic-dynamic AOF
+(`multiple_models`).
 
     `logic_dynamic_fos`   zeta_k = z_k                             (ФОСлд)
     `logic_dynamic_fkp`   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})  (ФКПлд, finite memory)
@@ -28,17 +32,25 @@ from kfcourse.errors import expect
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.multiple_models import mixture, modes_given, onward
-from kfcourse.filters.optimal_structure import STEPS, Memory, Remembered, checked_memory, expected_where_missing
+from kfcourse.filters.optimal_structure import (
+    STEPS,
+    Memory,
+    Remembered,
+    checked_memory,
+    expected_where_missing,
+)
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, expect_each
 
-RIDGE = 1e-12  # of the largest variance, that a law of zeta without width in a direction has a density
+# of the largest variance, that a law of zeta without width in a direction has a density
+RIDGE = 1e-12
 
 
 class Remembering(NamedTuple):
-    """What the filter remembers; the first three as of `multiple_models.Modes`, found anew from the last at each step."""
+    """What the filter remembers; the first three as of `multiple_models.Modes`, found anew from the
+    last at each step."""
 
     probability: Array
     expected: Array
@@ -57,8 +69,11 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
     return _remembering("fos", model, structures, Memory())
 
 
-def logic_dynamic_fkp(model: JumpModel, structures: Sequence[Structure], memory: int = STEPS) -> Design:
-    """The logic-dynamic filter with finite memory: what the last `memory` measurements tell of state and mode.
+def logic_dynamic_fkp(
+    model: JumpModel, structures: Sequence[Structure], memory: int = STEPS
+) -> Design:
+    """The logic-dynamic filter with finite memory: what the last `memory` measurements tell of
+    state and mode.
 
     Raises
     ------
@@ -67,16 +82,24 @@ def logic_dynamic_fkp(model: JumpModel, structures: Sequence[Structure], memory:
     ModelError
         As of `logic_dynamic_fos`.
     """
-    return _remembering(f"fkp{checked_memory(memory)}", model, structures, Memory(estimates=0, measurements=memory))
+    return _remembering(
+        f"fkp{checked_memory(memory)}", model, structures, Memory(estimates=0, measurements=memory)
+    )
 
 
-def logic_dynamic_fbp(model: JumpModel, structures: Sequence[Structure], memory: int = STEPS) -> Design:
-    """The logic-dynamic filter of high order: what the last `memory` estimates tell; errors as of `logic_dynamic_fkp`."""
+def logic_dynamic_fbp(
+    model: JumpModel, structures: Sequence[Structure], memory: int = STEPS
+) -> Design:
+    """The logic-dynamic filter of high order: what the last `memory` estimates tell; errors as of
+    `logic_dynamic_fkp`."""
     return _remembering(f"fbp{checked_memory(memory)}", model, structures, Memory(estimates=memory))
 
 
-def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], memory: Memory) -> Design:
-    """The construction.  A missing measurement is remembered as its prediction, the mean over the modes."""
+def _remembering(
+    name: str, model: JumpModel, structures: Sequence[Structure], memory: Memory
+) -> Design:
+    """The construction.  A missing measurement is remembered as its prediction, the mean over the
+    modes."""
     what = f"the logic-dynamic {name.upper()}"
     expect(model, JumpModel, what)
     expect_each(structures, what)
@@ -87,13 +110,20 @@ def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], m
     def init(runs: int) -> State:
         start = initial_state(model.modes[0])(runs)
         expected = np.tile(model.first, (runs, 1))
-        return start._replace(memory=Remembering(expected, expected, (start.predicted,) * len(structures)))
+        return start._replace(
+            memory=Remembering(expected, expected, (start.predicted,) * len(structures))
+        )
 
     def equations(state: State, y: Array) -> Equations:
         k, before = state.step, state.memory
         now = [structure.at(k) for structure in structures]
-        expectations = [one.measure(*prior) for one, prior in zip(now, before.predicted, strict=True)]
-        corrected = [correct(prior, one, y) for prior, one in zip(before.predicted, expectations, strict=True)]
+        expectations = [
+            one.measure(*prior) for one, prior in zip(now, before.predicted, strict=True)
+        ]
+        corrected = [
+            correct(prior, one, y)
+            for prior, one in zip(before.predicted, expectations, strict=True)
+        ]
         mu, _ = modes_given(before.expected, expectations, y)
         posterior = mixture(corrected, mu)
         seen = _seen(y, before.expected, expectations) if memory.measurements else y
@@ -117,8 +147,16 @@ def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], m
             densities.append(Measurement(fit.offset, unit, cov, cov))
         xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, zeta)
         expected, shares = onward(xi, model.transition_at(k))
-        following = [mixture([now[j].predict(*law) for law in laws], shares[:, :, j]) for j in range(len(now))]
-        return State(k + 1, posterior, mixture(following, expected), Remembering(mu, expected, tuple(following), kept))
+        following = [
+            mixture([now[j].predict(*law) for law in laws], shares[:, :, j])
+            for j in range(len(now))
+        ]
+        return State(
+            k + 1,
+            posterior,
+            mixture(following, expected),
+            Remembering(mu, expected, tuple(following), kept),
+        )
 
     return Design(f"{name}-jump-{structures[0].name}", model.modes[0], equations, start=init)
 

@@ -3,9 +3,10 @@
     x_{k+1} = A x_k + v_k,  v ~ N(0, Q)
     y_k     = H x_k + w_k,  w ~ N(0, R)
 
-Read this file first.  Every filter of the course is this correction and prediction with other functions in the place of the
-matrices; on a linear model with normal noises each must give these numbers, and the tests pin it.  What rounding does to
-the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`.  Kalman (1960).
+Read this file first.  Every filter of the course is this correction and prediction with other
+functions in the place of the matrices; on a linear model with normal noises each must give these
+numbers, and the tests pin it.  What rounding does to the step, and the forms that stand it better,
+is in `kfcourse.linear.arithmetic`.  Kalman (1960).
 """
 
 from __future__ import annotations
@@ -13,19 +14,28 @@ from __future__ import annotations
 from kfcourse.angles import near
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Gaussian, Vectors, any_missing, apply, regression, transpose, without_missing
+from kfcourse.laws import (
+    Gaussian,
+    Vectors,
+    any_missing,
+    apply,
+    regression,
+    transpose,
+    without_missing,
+)
 from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
 
 def correct(system: LinearSystem, predicted: Gaussian, y: Vectors) -> Gaussian:
-    """The law of the state after a measurement y, (..., p); its missing components (NaN) tell nothing.
+    """The law of the state after a measurement y, (..., p); its missing components (NaN) tell
+    nothing.
 
     K = P^- H^T (H P^- H^T + R)^-1,   z = x^- + K (y - H x^-),   P = P^- - K H P^-
 
-    P is evaluated as `kfcourse.laws.regression` does: a difference would lose the digits of a variance
-    that is far smaller than that of the prediction.
+    P is evaluated as `kfcourse.laws.regression` does: a difference would lose the digits of a
+    variance that is far smaller than that of the prediction.
     """
     x, P = predicted
     H, R = system.H, system.R
@@ -56,7 +66,8 @@ def kalman_filter(model: Model) -> Filter:
     system_at = linear_systems(model)
 
     def step(state: State, y: Vectors) -> State:
-        system, shift, offset = system_at(state.step)  # and the constants of the object and of the meter
+        # and the constants of the object and of the meter
+        system, shift, offset = system_at(state.step)
         expected = apply(system.H, state.predicted.mean)
         posterior = correct(system, state.predicted, near(y - offset, expected, model.angles.y))
         mean, cov = predict(system, posterior)

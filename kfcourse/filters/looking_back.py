@@ -1,8 +1,8 @@
 r"""Looking back from the states that a filter has left: what the whole record tells of each.
 
-A filter whose laws are normal takes the step of Rauch, Tung and Striebel (1965; `kfcourse.linear.smoothing`), with
-Cov(x_k, x_{k+1}) = p A^T from its structural functions; the exact filter and particles have ways of their own,
-`Filter.look_back`.
+A filter whose laws are normal takes the step of Rauch, Tung and Striebel (1965;
+`kfcourse.linear.smoothing`), with Cov(x_k, x_{k+1}) = p A^T from its structural functions; the
+exact filter and particles have ways of their own, `Filter.look_back`.
 """
 
 from __future__ import annotations
@@ -18,23 +18,35 @@ from kfcourse.laws import Array, Gaussian, product, transpose
 from kfcourse.linear.smoothing import Backward, check_lag, look_back
 from kfcourse.symbolic.structure import Structure
 
-ROUNDING = 1e-8  # of a prediction's standard deviations: by so much A p A^T + Q may be another than Psi without a reason
+# of a prediction's standard deviations: by so much A p A^T + Q may be another than Psi without a
+# reason
+ROUNDING = 1e-8
 
 
-def looked_back(one: Filter, states: Iterable[State], y: Array, lag: int | None = None) -> list[State]:
-    """States whose laws are those given the whole record y (steps, runs, p), from the filter's after each measurement.
+def looked_back(
+    one: Filter, states: Iterable[State], y: Array, lag: int | None = None
+) -> list[State]:
+    """States whose laws are those given the whole record y (steps, runs, p), from the filter's
+    after each measurement.
 
-    With a lag, given so many later measurements: a way of a filter's own then looks back as often as there are steps.
-    ValueError for a filter that has no way to look back, or a lag that is none.
+    With a lag, given so many later measurements: a way of a filter's own then looks back as often
+    as there are steps. ValueError for a filter that has no way to look back, or a lag that is none.
     """
     if one.look_back is None:
-        structure, back, laws = structure_of(one, "looking back"), list[Backward](), list[Gaussian]()
+        structure, back, laws = (
+            structure_of(one, "looking back"),
+            list[Backward](),
+            list[Gaussian](),
+        )
         before: State | None = None
         for state in states:
             back += [] if before is None else [_backward(structure, before)]
             laws.append(state.posterior)
             before = state
-        return [State(k, law, law) for k, law in enumerate(look_back(back, laws, lag, one.model.angles.x), start=1)]
+        return [
+            State(k, law, law)
+            for k, law in enumerate(look_back(back, laws, lag, one.model.angles.x), start=1)
+        ]
     check_lag(lag)
     back_to, reach = one.look_back(states, y), len(y) if lag is None else min(lag + 1, len(y))
     early = [deque(islice(back_to(end), reach), maxlen=1)[0] for end in range(reach, len(y))]
@@ -42,7 +54,8 @@ def looked_back(one: Filter, states: Iterable[State], y: Array, lag: int | None 
 
 
 def _backward(structure: Structure, state: State) -> Backward:
-    """The regression on the next step.  What a filter that remembers more than laws (`gated`) has added counts as noise."""
+    """The regression on the next step.  What a filter that remembers more than laws (`gated`) has
+    added counts as noise."""
     posterior, predicted = state.posterior, state.predicted
     A, Q = structure.at(state.step - 1).transition(*posterior)
     if state.memory is not None:

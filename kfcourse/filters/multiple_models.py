@@ -1,34 +1,41 @@
-r"""Filters for an object that changes its way of moving or of being measured: one normal law for each mode.
+r"""Filters for an object that changes its way of moving or of being measured: one normal law for
+each mode.
 
-The object is in one of M modes, each with its own model of the same state; the mode is a Markov chain,
+The object is in one of M modes, each with its own model of the same state; the mode is a Markov
+chain,
 
     pi_ij = P(mode j at k + 1 | mode i at k)
 
-The exact filter would keep one normal law for each history of modes, M^k of them.  These filters merge them once a step, a
-mixture into the normal law with its mean and covariance.  With mu_j the probability of mode j after y_k, c_j before it:
+The exact filter would keep one normal law for each history of modes, M^k of them.  These filters
+merge them once a step, a mixture into the normal law with its mean and covariance.  With mu_j the
+probability of mode j after y_k, c_j before it:
 
-    correct     z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;   mu_j = c_j L_j / sum_i c_i L_i
+    correct   z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;
+        mu_j = c_j L_j / sum_i c_i L_i
     combine     z = sum mu_j z_j,   p = sum mu_j (p_j + (z_j - z)(z_j - z)^T)
     chain       c_j = sum_i pi_ij mu_i,   mu_i|j = pi_ij mu_i / c_j
 
 and then they differ by when they merge:
 
-    `imm`               the laws of the modes that may lead to j, before a prediction: tau_j, Theta_j of the mixture
-    `logic_dynamic`     after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)     (логико-динамический АОФ)
-    `gpb2`              after the next correction, J^2 laws in between (generalised pseudo-Bayes of order 2)
+    `imm`   before a prediction, the laws of the modes that may lead to j: tau_j, Theta_j of the
+        mixture
+    `logic_dynamic`   after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)
+        (логико-динамический АОФ)
+    `gpb2`   after the next correction, J^2 laws in between (generalised pseudo-Bayes of order 2)
 
-The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan (2001), section 11.6; for
-the second Rudenko's logic-dynamic filters.
+The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan
+(2001), section 11.6; for the second Rudenko's logic-dynamic filters.
 
-Transitions may depend on the state, pi_ij(x).  With the law N(z, p) of x_k in mode i, Bayes' formula for the next mode gives
+Transitions may depend on the state, pi_ij(x).  With the law N(z, p) of x_k in mode i, Bayes'
+formula for the next mode gives
 
-    nu_ij = M_N[pi_ij(x)]                                      how probable j is
-    z_ij  = M_N[x pi_ij(x)] / nu_ij                            the law of x_k, given that j comes next: N weighted by pi_ij,
+    nu_ij = M_N[pi_ij(x)]             how probable j is
+    z_ij  = M_N[x pi_ij(x)] / nu_ij   the law of x_k, given that j comes next: N weighted by pi_ij,
     p_ij  = M_N[(x - z_ij)(x - z_ij)^T pi_ij(x)] / nu_ij       taken for a normal one
 
-which takes the places of pi_ij and (z_i, p_i) before a prediction; for affine a that is exact.  The means are found by
-Gauss-Hermite quadrature over the components that pi_ij contains, which a jump of pi_ij deceives by some per cent; the other
-components follow by regression on these.
+which takes the places of pi_ij and (z_i, p_i) before a prediction; for affine a that is exact.  The
+means are found by Gauss-Hermite quadrature over the components that pi_ij contains, which a jump of
+pi_ij deceives by some per cent; the other components follow by regression on these.
 """
 
 from __future__ import annotations
@@ -43,7 +50,17 @@ from scipy.special import logsumexp
 from kfcourse.angles import Components, near, on_circle
 from kfcourse.errors import ModelError
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, log_density, square_root, transpose
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Measurement,
+    apply,
+    correct,
+    gain,
+    log_density,
+    square_root,
+    transpose,
+)
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import product_rule
@@ -76,7 +93,12 @@ class Modes(NamedTuple):
     predicted: tuple[Gaussian, ...]
 
 
-def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "imm") -> Filter:
+def imm(
+    structures: Sequence[Structure],
+    transition: Chain,
+    probabilities: Array | None = None,
+    name: str = "imm",
+) -> Filter:
     """The IMM filter with one structure a mode.
 
     Parameters
@@ -84,7 +106,8 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     structures : sequence of M Structure
         Models with the same state, measurement and prior.
     transition : ndarray (M, M), callable, or JumpModel
-        pi, rows sum to 1; or the step k to the pi from k to k + 1; or the model that has it, which may depend on the state.
+        pi, rows sum to 1; or the step k to the pi from k to k + 1; or the model that has it, which
+        may depend on the state.
     probabilities : ndarray (M,), optional
         Of the modes before the first measurement; by default those of the JumpModel, else equal.
     name : str
@@ -93,7 +116,8 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     Returns
     -------
     Filter
-        `state.memory` is a `Modes`.  A missing measurement leaves laws and probabilities as predicted.
+        `state.memory` is a `Modes`.  A missing measurement leaves laws and probabilities as
+        predicted.
 
     Raises
     ------
@@ -105,14 +129,19 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
         Transitions that depend on more than three components of the state.
     """
 
-    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components) -> Gaussian:
+    def following(
+        predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components
+    ) -> Gaussian:
         return predict(*mixture(laws, weights, angles))
 
     return _one_law_a_mode(name, structures, transition, probabilities, following)
 
 
 def logic_dynamic(
-    structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str | None = None
+    structures: Sequence[Structure],
+    transition: Chain,
+    probabilities: Array | None = None,
+    name: str | None = None,
 ) -> Filter:
     """The logic-dynamic AOF: as `imm`, but predictions are merged, not the laws before them.
 
@@ -123,7 +152,9 @@ def logic_dynamic(
     """
     expect_each(structures, "logic_dynamic")
 
-    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components) -> Gaussian:
+    def following(
+        predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components
+    ) -> Gaussian:
         return mixture([predict(*law) for law in laws], weights, angles)
 
     name = name or "aof-jump-" + "".join(structure.name for structure in structures[:1])
@@ -137,13 +168,16 @@ def _one_law_a_mode(
     probabilities: Array | None,
     following: Callable[[Predict, Sequence[Gaussian], Array, Components], Gaussian],
 ) -> Filter:
-    """A filter that merges what may lead to each mode by `following`: (the mode's tau, Theta; laws; weights) -> prediction."""
+    """A filter that merges what may lead to each mode by `following`: (the mode's tau, Theta; laws;
+    weights) -> prediction."""
     links, first, model = _checked(name, structures, transition, probabilities)
     angles = model.angles.x
 
     def init(runs: int) -> State:
         start, expected = initial_state(model)(runs), np.tile(first, (runs, 1))
-        return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(structures)))
+        return start._replace(
+            memory=Modes(expected, expected, (start.predicted,) * len(structures))
+        )
 
     def step(state: State, y: Array) -> State:
         memory, now = state.memory, [structure.at(state.step) for structure in structures]
@@ -151,7 +185,8 @@ def _one_law_a_mode(
         pi, leading = links(state.step, corrected)
         expected, weights = onward(mu, pi)
         predicted = tuple(
-            following(structure.predict, [row[j] for row in leading], weights[:, :, j], angles) for j, structure in enumerate(now)
+            following(structure.predict, [row[j] for row in leading], weights[:, :, j], angles)
+            for j, structure in enumerate(now)
         )
         law, ahead = mixture(corrected, mu, angles), mixture(predicted, expected, angles)
         return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
@@ -159,21 +194,32 @@ def _one_law_a_mode(
     return Filter(name, model, init, step, evidence=partial(_evidence, structures))
 
 
-def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "gpb2") -> Filter:
-    """The generalised pseudo-Bayes filter of order 2: pairs of modes (i_{k-1}, i_k) are corrected each, and merged afterwards.
+def gpb2(
+    structures: Sequence[Structure],
+    transition: Chain,
+    probabilities: Array | None = None,
+    name: str = "gpb2",
+) -> Filter:
+    """The generalised pseudo-Bayes filter of order 2: pairs of modes (i_{k-1}, i_k) are corrected
+    each, and merged afterwards.
 
-    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.  A mode whose probability is
-    too small for a number goes on from the estimate: corrected time and again as if it held, its own law would leave the numbers.
+    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.
+    A mode whose probability is too small for a number goes on from the estimate: corrected time and
+    again as if it held, its own law would leave the numbers.
 
-    Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
+    Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs,
+    i first.
     """
     links, first, model = _checked(name, structures, transition, probabilities)
     angles, size = model.angles.x, len(structures)
 
     def init(runs: int) -> State:
         start = initial_state(model)(runs)
-        pairs = np.tile(first / size, (runs, size))  # as if any mode had come before, the same law of each
-        return start._replace(memory=Modes(np.tile(first, (runs, 1)), pairs, (start.predicted,) * size**2))
+        # as if any mode had come before, the same law of each
+        pairs = np.tile(first / size, (runs, size))
+        return start._replace(
+            memory=Modes(np.tile(first, (runs, 1)), pairs, (start.predicted,) * size**2)
+        )
 
     def step(state: State, y: Array) -> State:
         memory, now = state.memory, [structure.at(state.step) for structure in structures]
@@ -184,22 +230,37 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         law = mixture(laws, mu, angles)
         laws = [_where(mu[:, j] > 0, of_mode, law) for j, of_mode in enumerate(laws)]
         pi, leading = links(state.step, laws)
-        predicted = tuple(structure.predict(*law) for row in leading for structure, law in zip(now, row, strict=True))
+        predicted = tuple(
+            structure.predict(*law)
+            for row in leading
+            for structure, law in zip(now, row, strict=True)
+        )
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
-        return State(state.step + 1, law, mixture(predicted, expected, angles), Modes(mu, expected, predicted))
+        return State(
+            state.step + 1,
+            law,
+            mixture(predicted, expected, angles),
+            Modes(mu, expected, predicted),
+        )
 
     return Filter(name, model, init, step, evidence=partial(_evidence, structures))
 
 
 def _expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
-    """What is expected to be measured in each mode, or for each pair of modes in the second of them."""
+    """What is expected to be measured in each mode, or for each pair of modes in the second of
+    them."""
     return [now[i % len(now)].measure(*law) for i, law in enumerate(memory.predicted)]
 
 
-def _corrected(now: Sequence[Structure], memory: Modes, y: Array) -> tuple[list[Gaussian], Array, Array]:
+def _corrected(
+    now: Sequence[Structure], memory: Modes, y: Array
+) -> tuple[list[Gaussian], Array, Array]:
     """The laws corrected with y, their probabilities (runs, ...), and ln p(y)."""
     expectations = _expectations(now, memory)
-    laws = [correct(law, expected, y) for law, expected in zip(memory.predicted, expectations, strict=True)]
+    laws = [
+        correct(law, expected, y)
+        for law, expected in zip(memory.predicted, expectations, strict=True)
+    ]
     return laws, *modes_given(memory.expected, expectations, y)
 
 
@@ -212,11 +273,15 @@ def _where(holds: Array, law: Gaussian, other: Gaussian) -> Gaussian:
     """For each trajectory one of two laws."""
     if holds.all():
         return law
-    return Gaussian(np.where(holds[:, None], law.mean, other.mean), np.where(holds[:, None, None], law.cov, other.cov))
+    return Gaussian(
+        np.where(holds[:, None], law.mean, other.mean),
+        np.where(holds[:, None, None], law.cov, other.cov),
+    )
 
 
 def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
-    """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M); pi (M, M) or (runs, M, M)."""
+    """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M); pi (M, M) or (runs,
+    M, M)."""
     joint = mu[:, :, None] * pi
     expected = joint.sum(axis=1)
     if not np.minimum.reduce(expected, axis=None) > 0:
@@ -234,7 +299,8 @@ def _shares(joint: Array) -> Array:
 def _checked(
     name: str, structures: Sequence[Structure], transition: Chain, probabilities: Array | None
 ) -> tuple[Links, Array, Model]:
-    """The links, the first probabilities (M,), and the first model; errors if the parts do not fit."""
+    """The links, the first probabilities (M,), and the first model; errors if the parts do not
+    fit."""
     expect_each(structures, name)
     size = len(structures)
     if not size:
@@ -246,7 +312,11 @@ def _checked(
             ("state", [s.name for s in first.x], [s.name for s in model.x]),
             ("number of measured components", first.p, model.p),
             ("components that are angles", first.angles, model.angles),
-            ("prior", [part.tolist() for part in first.prior], [part.tolist() for part in model.prior]),
+            (
+                "prior",
+                [part.tolist() for part in first.prior],
+                [part.tolist() for part in model.prior],
+            ),
         ):
             if mine != its:
                 raise ValueError(f"all modes need the same {what}: {mine} and {its} differ")
@@ -273,23 +343,31 @@ def _probabilities(what: str, given: Array, shape: tuple[int, ...]) -> Array:
     """The probabilities, whose rows sum to 1; ValueError if they are none."""
     table = np.asarray(given, dtype=float)
     if table.shape != shape:
-        raise ValueError(f"{what} must have the shape {shape} for {shape[0]} mode(s), got {table.shape}")
+        raise ValueError(
+            f"{what} must have the shape {shape} for {shape[0]} mode(s), got {table.shape}"
+        )
     total = table.sum(axis=-1, keepdims=True)
     if not (np.isfinite(table).all() and table.min() >= 0 and np.allclose(total, 1.0, atol=1e-9)):
-        raise ValueError(f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got {table.tolist()}")
+        raise ValueError(
+            f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got "
+            f"{table.tolist()}"
+        )
     return table / total
 
 
 def by_state(model: JumpModel) -> Links:
-    """The function of the step and the laws in each mode that gives nu (runs, J, J), and the laws N(z_ij, p_ij), i first.
+    """The function of the step and the laws in each mode that gives nu (runs, J, J), and the laws
+    N(z_ij, p_ij), i first.
 
     ModelError for formulas of more than three components.
     """
     used = [i for i, component in enumerate(model.x) if model.chain.has(component)]
     if len(used) > max(ORDER):
         raise ModelError(
-            f"transitions that depend on {len(used)} components are not integrated: that takes too many points; let them depend "
-            f"on at most {max(ORDER)}, or make one number of the state on which they depend a component of its own"
+            f"transitions that depend on {len(used)} components are not integrated: that takes "
+            f"too many points; let them depend "
+            f"on at most {max(ORDER)}, or make one number of the state on which they depend a "
+            f"component of its own"
         )
     nodes, weights = product_rule(ORDER[len(used)])(len(used))
 
@@ -297,17 +375,21 @@ def by_state(model: JumpModel) -> Links:
         """nu_ij (runs, J), and N(z_ij, p_ij) for each j."""
         mean, cov = law.mean, np.broadcast_to(law.cov, (*law.mean.shape, law.mean.shape[-1]))
         root = square_root(cov[..., used, :][..., used])
-        spread = gain(cov[..., used], cov[..., used, :][..., used]) @ root  # x = z + spread s, but for what s does not tell
+        # x = z + spread s, but for what s does not tell
+        spread = gain(cov[..., used], cov[..., used, :][..., used]) @ root
         x = np.repeat(mean[:, None], len(nodes), axis=1)
         x[..., used] += nodes @ transpose(root)
         mass = weights[:, None] * model.transition_of(x, k)[..., i, :]
         nu, laws = mass.sum(axis=1), []
-        mass = np.where(nu[:, None] > 0, mass, weights[:, None])  # where j cannot come the law stays as it is
+        # where j cannot come the law stays as it is
+        mass = np.where(nu[:, None] > 0, mass, weights[:, None])
         for share in np.moveaxis(mass / mass.sum(axis=1, keepdims=True), -1, 0):
             centre = share @ nodes
             away = nodes - centre[:, None]
             excess = transpose(share[..., None] * away) @ away - np.eye(len(used))
-            laws.append(Gaussian(mean + apply(spread, centre), cov + spread @ excess @ transpose(spread)))
+            laws.append(
+                Gaussian(mean + apply(spread, centre), cov + spread @ excess @ transpose(spread))
+            )
         return nu, laws
 
     def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
@@ -317,13 +399,19 @@ def by_state(model: JumpModel) -> Links:
     return links
 
 
-def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
-    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0.
+def modes_given(
+    expected: Array, measurements: Sequence[Measurement], y: Array
+) -> tuple[Array, Array]:
+    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far
+    from the truth are 0.
 
-    Where y is known before with certainty the density is infinite, and its modes share the probability.
+    Where y is known before with certainty the density is infinite, and its modes share the
+    probability.
     """
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
-        logs = np.log(expected) + np.stack([log_density(measurement, y) for measurement in measurements], axis=-1)
+        logs = np.log(expected) + np.stack(
+            [log_density(measurement, y) for measurement in measurements], axis=-1
+        )
     logs = np.minimum(logs, CERTAIN)
     total = logsumexp(logs, axis=1)
     return np.exp(logs - total[:, None]), np.where(total < CERTAIN, total, np.inf)
@@ -340,7 +428,9 @@ def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -
         return laws[0]
     means = np.stack([law.mean for law in laws])
     if angles:
-        means = near(means, np.take_along_axis(means, weights.argmax(axis=1)[None, :, None], axis=0), angles)
+        means = near(
+            means, np.take_along_axis(means, weights.argmax(axis=1)[None, :, None], axis=0), angles
+        )
     mean, cov = np.einsum("rj,jri->ri", weights, means), np.zeros(())
     for weight, law, off in zip(weights.T[..., None, None], laws, means - mean, strict=True):
         cov = cov + weight * (law.cov + off[..., :, None] * off[..., None, :])

@@ -21,7 +21,8 @@ def matrix(latex: str, rows: sp.Expr, columns: sp.Expr) -> sp.MatrixSymbol:
 
 
 def equation(left: sp.Expr, right: sp.Expr) -> sp.Eq:
-    """left = right as it is written: SymPy would first look whether their difference is zero, for a third of a start's time."""
+    """left = right as it is written: SymPy would first look whether their difference is zero, for a
+    third of a start's time."""
     return sp.Eq(left, right, evaluate=False)
 
 
@@ -78,7 +79,10 @@ def cov_pinv(of: sp.MatrixSymbol) -> sp.MatrixSymbol:
 
 @cache  # filters of one construction have the same: half the time in which their equations are made
 def regression(
-    coefficient: sp.MatrixSymbol, offset: sp.MatrixSymbol, target: sp.MatrixSymbol, regressor: sp.MatrixSymbol
+    coefficient: sp.MatrixSymbol,
+    offset: sp.MatrixSymbol,
+    target: sp.MatrixSymbol,
+    regressor: sp.MatrixSymbol,
 ) -> tuple[sp.Eq, sp.Eq]:
     """The two equations of an affine regression of target on regressor."""
     return (
@@ -94,7 +98,9 @@ class _Printer(LatexPrinter):
         def negative(term: sp.MatrixExpr) -> bool:
             return bool(term.as_coeff_mmul()[0].is_negative)
 
-        terms = sorted(expr.args, key=lambda term: (negative(term), not isinstance(term, sp.MatrixSymbol)))
+        terms = sorted(
+            expr.args, key=lambda term: (negative(term), not isinstance(term, sp.MatrixSymbol))
+        )
         text = self._print(terms[0])
         for term in terms[1:]:
             text += f" - {self._print(-term)}" if negative(term) else f" + {self._print(term)}"

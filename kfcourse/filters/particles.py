@@ -1,29 +1,35 @@
-r"""The particle filter: the Stratonovich equation by sampling, for models of any dimension, with modes or without.
+r"""The particle filter: the Stratonovich equation by sampling, for models of any dimension, with
+modes or without.
 
-    x_k^i ~ q(x | x_{k-1}^i, y_k),    weight  p(y_k | x_k^i) p(x_k^i | x_{k-1}^i) / q(x_k^i | x_{k-1}^i, y_k)
+    x_k^i ~ q(x | x_{k-1}^i, y_k),   weight
+        p(y_k | x_k^i) p(x_k^i | x_{k-1}^i) / q(x_k^i | x_{k-1}^i, y_k)
 
-Without looking at the measurement (q = p(x | x_{k-1}), the bootstrap filter) it fails in the lab's own case: where
-the meter is hundreds of times sharper than the prediction, few particles fall where the posterior is.  So the
-proposal looks at it.  A particle x and standard normal s make the next state and its measurement,
+Without looking at the measurement (q = p(x | x_{k-1}), the bootstrap filter) it fails in the lab's
+own case: where the meter is hundreds of times sharper than the prediction, few particles fall where
+the posterior is.  So the proposal looks at it.  A particle x and standard normal s make the next
+state and its measurement,
 
     x' = a(x, m_v + L s),  L L^T = D_v;     y = g(s) + e,   g(s) = b(x', m_w),   Cov(e) = R(s)
 
-and a step of Gauss and Newton, which is a correction with g and R taken for affine and constant at the last s, finds
-a normal law of s; some of them find the posterior's mode and width.  q is a wider law of Student's there, beside a
-part of N(0, I) itself.  The initial state is a noise, too: x_0 = m + L s.
+and a step of Gauss and Newton, which is a correction with g and R taken for affine and constant at
+the last s, finds a normal law of s; some of them find the posterior's mode and width.  q is a wider
+law of Student's there, beside a part of N(0, I) itself.  The initial state is a noise, too: x_0 = m
++ L s.
 
-Of a model that jumps a particle is a state and a mode.  The next mode is drawn with probability in proportion to
-pi_ij(x) times the normal density of y_k that the proposal of mode j has left.
+Of a model that jumps a particle is a state and a mode.  The next mode is drawn with probability in
+proportion to pi_ij(x) times the normal density of y_k that the proposal of mode j has left.
 
-The particles are two clouds that know nothing of each other.  Their estimates z_a and z_b err independently, so that
+The particles are two clouds that know nothing of each other.  Their estimates z_a and z_b err
+independently, so that
 
     M[|z - z*|^2] = M[(z - z_a)^T (z - z_b)],      z* the exact estimate, z that of any filter,
 
-without any contribution of the sampling: that is how particles bound other filters where `exact` does not reach.
+without any contribution of the sampling: that is how particles bound other filters where `exact`
+does not reach.
 
-Looking back is backward sampling (Godsill, Doucet and West, 2004): of a state x~ drawn from p(x_{k+1} | Y), the
-particle x^j of step k, resampled, is the ancestor with a probability in proportion to p(x~ | x^j).
-Gordon, Salmond and Smith (1993); Doucet, Godsill and Andrieu (2000).
+Looking back is backward sampling (Godsill, Doucet and West, 2004): of a state x~ drawn from
+p(x_{k+1} | Y), the particle x^j of step k, resampled, is the ancestor with a probability in
+proportion to p(x~ | x^j). Gordon, Salmond and Smith (1993); Doucet, Godsill and Andrieu (2000).
 """
 
 from __future__ import annotations
@@ -40,18 +46,32 @@ from kfcourse.angles import Components, difference, moments_on_circle, near, on_
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
-from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, log_density, square_root, transpose
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Measurement,
+    apply,
+    correct,
+    log_density,
+    square_root,
+    transpose,
+)
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
-ROUNDS = 2  # steps of Gauss and Newton: after one a hundredth of the particles may count on variant 53, a third adds nothing
+# steps of Gauss and Newton: after one a hundredth of the particles may count on variant 53, a third
+# adds nothing
+ROUNDS = 2
 SMALL = 1e-4  # step in s by which slopes are found, in standard deviations
-NARROWEST = 1e-7  # width of a law of s: the root of a nearly singular covariance is right to as much
-FREEDOM, WIDER = 4.0, 1.2  # of Student's law around the mode, whose tails the posterior's must not exceed
+# width of a law of s: the root of a nearly singular covariance is right to as much
+NARROWEST = 1e-7
+# of Student's law around the mode, whose tails the posterior's must not exceed
+FREEDOM, WIDER = 4.0, 1.2
 PRIOR = 0.1  # share drawn from N(0, I) and of modes drawn by pi, for what a normal law does not see
-STARTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # of the search for the modes of x_0, in standard deviations
+# of the search for the modes of x_0, in standard deviations
+STARTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 LARGEST = 1e150  # the squares of larger states are infinite
 PATHS = 200  # that each cloud draws when it looks back
 ELEMENTS = 2**21  # of the largest array, 16 MB
@@ -96,21 +116,29 @@ class Clouds:
         return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=-1))
 
     def evidence_error(self) -> Array:
-        """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
+        """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of
+        both clouds."""
         return 0.5 * np.abs(self.evidence[0] - self.evidence[1])
 
 
 def particle(
-    model: Model | JumpModel, particles: int = 1000, seed: int = 0, *, guided: bool = True, name: str = "particle"
+    model: Model | JumpModel,
+    particles: int = 1000,
+    seed: int = 0,
+    *,
+    guided: bool = True,
+    name: str = "particle",
 ) -> Filter:
     """The particle filter, resampled systematically at each step, each cloud for itself.
 
     Parameters
     ----------
     model : Model or JumpModel
-        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly, or can be solved for.
+        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly, or can be
+        solved for.
     particles : int
-        Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells how many count.
+        Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells
+        how many count.
     seed : int
         Steps are reproducible: the same state and measurement give the same result.
     guided : bool
@@ -121,8 +149,9 @@ def particle(
     Returns
     -------
     Filter
-        Its covariance estimates the posterior's; too large where few count, by some tenths where 40 without
-        guidance meet a sharp meter.  `state.memory.probability` are the modes' probabilities.
+        Its covariance estimates the posterior's; too large where few count, by some tenths where 40
+        without guidance meet a sharp meter.  `state.memory.probability` are the modes'
+        probabilities.
 
     Raises
     ------
@@ -131,7 +160,9 @@ def particle(
     """
     expect(model, Model, "particle", JumpModel)
     if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
-        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
+        raise ModelError(
+            f"a particle filter needs an even number of at least 2 particles, got {particles!r}"
+        )
     jumping = model if isinstance(model, JumpModel) else None
     modes = [Mode.of(each) for each in (model.modes if isinstance(model, JumpModel) else (model,))]
     first, size = np.ones(1) if jumping is None else jumping.first, particles // 2
@@ -149,10 +180,15 @@ def particle(
         """Probabilities of the mode after step k, (runs, 2, M/2, J)."""
         if jumping is None:
             return np.ones((*mode.shape, 1))
-        return np.take_along_axis(jumping.transition_of(x, k), mode[..., None, None], axis=-2)[..., 0, :]
+        return np.take_along_axis(jumping.transition_of(x, k), mode[..., None, None], axis=-2)[
+            ..., 0, :
+        ]
 
-    def drawn(rng: np.random.Generator, before: Clouds, y: Array, k: int) -> tuple[Array, Array, Array]:
-        """x_k (runs, 2, M/2, n), its modes, and ln of p over the density with which both were drawn."""
+    def drawn(
+        rng: np.random.Generator, before: Clouds, y: Array, k: int
+    ) -> tuple[Array, Array, Array]:
+        """x_k (runs, 2, M/2, n), its modes, and ln of p over the density with which both were
+        drawn."""
         shape = (len(y), 2, size)
         if before.x is None or before.mode is None:
             pi, n = np.broadcast_to(first, (*shape, len(modes))), len(prior.mean)
@@ -165,7 +201,11 @@ def particle(
             starts = [np.zeros((*shape, 1, mode.noises)) for mode in modes]
         states, logs, heights = [], [], []
         for way, moved, at in zip(modes, moves, starts, strict=True):
-            s, log, height = rng.standard_normal((*shape, at.shape[-1])), np.zeros(shape), np.zeros(shape)
+            s, log, height = (
+                rng.standard_normal((*shape, at.shape[-1])),
+                np.zeros(shape),
+                np.zeros(shape),
+            )
             if guided:
                 law, tells, height = way.look(moved, at, y[:, None, None, None], k)
                 wide, log_of_wide = _wide(rng, law, shape)
@@ -185,18 +225,35 @@ def particle(
             x, mode, logs = drawn(rng, state.memory, y, k)
             lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))
             x = np.where(lost[..., None], np.clip(np.nan_to_num(x), -LARGEST, LARGEST), x)
-            logs = logs + np.choose(mode, [each.log_likelihood(y[:, None, None], x, k) for each in modes])
+            logs = logs + np.choose(
+                mode, [each.log_likelihood(y[:, None, None], x, k) for each in modes]
+            )
             weights, log_mean = _normalised(np.where(lost, -np.inf, logs))
             mean, cov = weighted(x, weights, angles)
-            probability = [(weights * (mode == j)).sum(axis=-1).mean(axis=1) for j in range(len(modes))]
+            probability = [
+                (weights * (mode == j)).sum(axis=-1).mean(axis=1) for j in range(len(modes))
+            ]
             kept = _systematic(rng, weights)
-            x, mode = np.take_along_axis(x, kept[..., None], axis=2), np.take_along_axis(mode, kept, axis=2)
-            moves = [each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in modes]
+            x, mode = (
+                np.take_along_axis(x, kept[..., None], axis=2),
+                np.take_along_axis(mode, kept, axis=2),
+            )
+            moves = [
+                each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in modes
+            ]
             ahead = np.choose(_chosen(rng, chances(x, mode, k))[..., None], moves)
             predicted = _of_both(*weighted(ahead, np.full(mode.shape, 1 / size), angles), angles)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         halves = np.moveaxis(mean, 1, 0)
-        memory = Clouds(halves, effective, log_mean.T, x, mode, np.stack(probability, axis=-1), state.memory.part)
+        memory = Clouds(
+            halves,
+            effective,
+            log_mean.T,
+            x,
+            mode,
+            np.stack(probability, axis=-1),
+            state.memory.part,
+        )
         return State(k + 1, _of_both(mean, cov, angles), predicted, memory)
 
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
@@ -205,16 +262,28 @@ def particle(
         def back(end: int) -> Iterator[State]:
             rng = memories[0].generator(seed, end)
             for step, (clouds, weights) in zip(
-                range(end, 0, -1), _backwards(rng, [memory.x for memory in memories[:end]], law, angles), strict=True
+                range(end, 0, -1),
+                _backwards(rng, [memory.x for memory in memories[:end]], law, angles),
+                strict=True,
             ):
-                both, effective = _of_both(*clouds, angles), (1 / (weights**2).sum(axis=-1)).sum(axis=1)
+                both, effective = (
+                    _of_both(*clouds, angles),
+                    (1 / (weights**2).sum(axis=-1)).sum(axis=1),
+                )
                 halves = np.moveaxis(clouds.mean, 1, 0)
-                yield State(step, both, both, replace(memories[step - 1], x=None, halves=halves, effective=effective))
+                yield State(
+                    step,
+                    both,
+                    both,
+                    replace(memories[step - 1], x=None, halves=halves, effective=effective),
+                )
 
         return back
 
     way_back = look_back if jumping is None else None
-    return Filter(name, modes[0].model, init, step, slow=True, evidence=_evidence, look_back=way_back)
+    return Filter(
+        name, modes[0].model, init, step, slow=True, evidence=_evidence, look_back=way_back
+    )
 
 
 class Mode(NamedTuple):
@@ -226,7 +295,8 @@ class Mode(NamedTuple):
     noises : int
         r, the number of the object's noises.
     state, meter : callable
-        a(x, m_v + L s) and b(x, m_w + L w) at step k: (x (..., n), s (..., r), k), (x, w (..., q), k).
+        a(x, m_v + L s) and b(x, m_w + L w) at step k: (x (..., n), s (..., r), k), (x, w (..., q),
+        k).
     log_likelihood : callable
         (y (..., p), x (..., n), k) -> ln p(y | x).
     """
@@ -251,18 +321,26 @@ class Mode(NamedTuple):
         )
 
     def moved(self, x: Array, s: Array, k: int) -> Array:
-        """The states after step k, (..., n); `x` (..., n) itself, or for several s of each state (..., J, r)."""
+        """The states after step k, (..., n); `x` (..., n) itself, or for several s of each state
+        (..., J, r)."""
         x = x if x.ndim == s.ndim else x[..., None, :]
         shape = np.broadcast_shapes(x.shape[:-1], s.shape[:-1])
-        return on_circle(np.broadcast_to(self.state(x, s, k), (*shape, x.shape[-1])), self.model.angles.x)
+        return on_circle(
+            np.broadcast_to(self.state(x, s, k), (*shape, x.shape[-1])), self.model.angles.x
+        )
 
-    def look(self, moved: Callable[[Array], Array], s: Array, y: Array, k: int) -> tuple[Gaussian, Array, Array]:
-        """Normal laws of s (..., J, r) given y_k, searched for from s; whether y tells of s, (...); ln p(y) by these laws."""
+    def look(
+        self, moved: Callable[[Array], Array], s: Array, y: Array, k: int
+    ) -> tuple[Gaussian, Array, Array]:
+        """Normal laws of s (..., J, r) given y_k, searched for from s; whether y tells of s, (...);
+        ln p(y) by these laws."""
         turning, still = self.model.angles.y, np.zeros(len(self.model.w))
 
         def slopes(function: Callable[[Array], Array], at: Array, width: float) -> Array:
             beside = width * np.eye(at.shape[-1])
-            return np.stack([difference(function(at + e), function(at - e), turning) for e in beside], axis=-1) / (2 * width)
+            return np.stack(
+                [difference(function(at + e), function(at - e), turning) for e in beside], axis=-1
+            ) / (2 * width)
 
         law = Gaussian(s, np.eye(s.shape[-1]))
         for _ in range(ROUNDS):
@@ -271,7 +349,10 @@ class Mode(NamedTuple):
             H = slopes(lambda s: self.meter(moved(s), still, k), s, SMALL)
             B = slopes(lambda w, x=x: self.meter(x, w, k), still, 1.0)  # type: ignore[misc]
             R = B @ transpose(B)
-            seen, value = Measurement(h - apply(H, s), H, H @ transpose(H) + R, R), near(y, h, turning)
+            seen, value = (
+                Measurement(h - apply(H, s), H, H @ transpose(H) + R, R),
+                near(y, h, turning),
+            )
             law = correct(Gaussian(np.zeros_like(s), np.eye(s.shape[-1])), seen, value)
             law = Gaussian(np.nan_to_num(law.mean, posinf=0.0, neginf=0.0), law.cov)
         tells = (H != 0).any(axis=(-3, -2, -1)) & ~np.isnan(y).all(axis=(-2, -1))
@@ -280,18 +361,26 @@ class Mode(NamedTuple):
 
 
 def _wide(rng: np.random.Generator, law: Gaussian, shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """s (runs, 2, M/2, r) by a mixture of Student's laws around normal ones (..., J, r) and of N(0, I), and ln N(s; 0, I) / q."""
+    """s (runs, 2, M/2, r) by a mixture of Student's laws around normal ones (..., J, r) and of N(0,
+    I), and ln N(s; 0, I) / q."""
     J, r = law.mean.shape[-2:]
     cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + NARROWEST**2 * np.eye(r)
     root = WIDER * np.linalg.cholesky(np.broadcast_to(cov, (*law.mean.shape, r)))
     normal, which = rng.standard_normal((*shape, r)), rng.integers(J, size=(*shape, 1))
-    centre = np.take_along_axis(np.broadcast_to(law.mean, (*shape, J, r)), which[..., None], axis=-2)[..., 0, :]
-    width = np.take_along_axis(np.broadcast_to(root, (*shape, J, r, r)), which[..., None, None], axis=-3)[..., 0, :, :]
+    centre = np.take_along_axis(
+        np.broadcast_to(law.mean, (*shape, J, r)), which[..., None], axis=-2
+    )[..., 0, :]
+    width = np.take_along_axis(
+        np.broadcast_to(root, (*shape, J, r, r)), which[..., None, None], axis=-3
+    )[..., 0, :, :]
     student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, shape))[..., None]
     s = np.where((rng.random(shape) < PRIOR)[..., None], normal, centre + apply(width, student))
     square = (apply(np.linalg.inv(root), s[..., None, :] - law.mean) ** 2).sum(axis=-1)
-    laws = -0.5 * (FREEDOM + r) * np.log1p(square / FREEDOM) - np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
-    laws += gammaln((FREEDOM + r) / 2) - gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM / 2)  # over (2 pi)^(-r/2)
+    laws = -0.5 * (FREEDOM + r) * np.log1p(square / FREEDOM) - np.log(
+        np.diagonal(root, axis1=-2, axis2=-1)
+    ).sum(axis=-1)
+    # over (2 pi)^(-r/2)
+    laws += gammaln((FREEDOM + r) / 2) - gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM / 2)
     standard = -0.5 * (s * s).sum(axis=-1)
     mixed = np.logaddexp.reduce(laws, axis=-1) + np.log((1 - PRIOR) / J)
     return s, standard - np.logaddexp(mixed, standard + np.log(PRIOR))
@@ -303,22 +392,27 @@ def _evidence(before: State, y: Array, after: State) -> Array:
 
 
 def _normalised(logs: Array) -> tuple[Array, Array]:
-    """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of their mean before (...)."""
+    """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of
+    their mean before (...)."""
     peak = logs.max(axis=-1, keepdims=True)
     weights = np.nan_to_num(np.exp(logs - np.where(np.isfinite(peak), peak, 0.0)), posinf=0.0)
     total = weights.sum(axis=-1, keepdims=True)
     mean = peak + np.log(total / logs.shape[-1])
-    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
+    return np.where(
+        total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]
+    ), mean[..., 0]
 
 
 def _systematic(rng: np.random.Generator, weights: Array) -> Array:
-    """Indices (runs, 2, M/2) of systematic resampling: one uniform number a cloud, M/2 equal steps."""
+    """Indices (runs, 2, M/2) of systematic resampling: one uniform number a cloud, M/2 equal
+    steps."""
     size = weights.shape[-1]
     cumulative = np.cumsum(weights, axis=-1)
     cumulative /= cumulative[..., -1:]
     number = np.arange(cumulative[..., 0].size).reshape(*weights.shape[:-1], 1)
     wanted = (np.arange(size) + rng.random(number.shape)) / size
-    places = np.searchsorted((cumulative + 2.0 * number).ravel(), wanted + 2.0 * number)  # all clouds in one row
+    # all clouds in one row
+    places = np.searchsorted((cumulative + 2.0 * number).ravel(), wanted + 2.0 * number)
     return np.minimum(places - number * size, size - 1)
 
 
@@ -339,16 +433,23 @@ def weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
 def _of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:
     """The law by both clouds, from theirs (runs, 2, ...)."""
     half = 0.5 * difference(mean[:, 0], mean[:, 1], angles)
-    return Gaussian(on_circle(mean[:, 1] + half, angles), cov.mean(axis=1) + half[:, :, None] * half[:, None, :])
+    return Gaussian(
+        on_circle(mean[:, 1] + half, angles), cov.mean(axis=1) + half[:, :, None] * half[:, None, :]
+    )
 
 
 def _backwards(
-    rng: np.random.Generator, clouds: Sequence[Array], law: Callable[[Array, int], Gaussian], angles: Components
+    rng: np.random.Generator,
+    clouds: Sequence[Array],
+    law: Callable[[Array, int], Gaussian],
+    angles: Components,
 ) -> Iterator[tuple[Gaussian, Array]]:
-    """From the last step to the first: laws (runs, 2, n) of both clouds, and weights of their particles.
+    """From the last step to the first: laws (runs, 2, n) of both clouds, and weights of their
+    particles.
 
-    Means are taken over all particles by their probabilities of being an ancestor, before one of them is drawn.
-    ModelError where the next state has no density, as fewer noises than states enter the object.
+    Means are taken over all particles by their probabilities of being an ancestor, before one of
+    them is drawn. ModelError where the next state has no density, as fewer noises than states enter
+    the object.
     """
     size = clouds[-1].shape[2]
     paths = min(size, PATHS)
@@ -367,12 +468,14 @@ def _backwards(
 
 
 def _ancestors(after: Array, mean: Array, cov: Array, angles: Components) -> Array:
-    """Probabilities (runs, 2, paths, M) that particles, whose next states have these laws, are ancestors of `after`."""
+    """Probabilities (runs, 2, paths, M) that particles, whose next states have these laws, are
+    ancestors of `after`."""
     try:
         root = np.linalg.cholesky(cov)
     except np.linalg.LinAlgError:
         raise ModelError(
-            "particles look back by the density of the next state, and it has none: fewer noises than states enter the object; "
+            "particles look back by the density of the next state, and it has none: fewer noises "
+            "than states enter the object; "
             "give each state a noise, however small, or smooth with a filter of normal laws"
         ) from None
     root = np.broadcast_to(root, (*mean.shape, mean.shape[-1]))[:, :, None]

@@ -1,7 +1,8 @@
-"""The printed equations of a filter as what is computed for each trajectory of a scalar model: rules, letter and value.
+"""The printed equations of a filter as what is computed for each trajectory of a scalar model:
+rules, letter and value.
 
-In `kfcourse.filters.EQUATIONS`, such as z = lambda + K (y - h), numbers take the place of matrices, and the formulas of the
-model that of the structural functions.
+In `kfcourse.filters.EQUATIONS`, such as z = lambda + K (y - h), numbers take the place of matrices,
+and the formulas of the model that of the structural functions.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ _VALUES = {
 }
 
 
-def scalar(expression: sp.Basic, inverse: Callable[[sp.Expr], sp.Expr] = lambda e: 1 / e) -> sp.Expr:
+def scalar(
+    expression: sp.Basic, inverse: Callable[[sp.Expr], sp.Expr] = lambda e: 1 / e
+) -> sp.Expr:
     """An expression in matrices as one in numbers: of one component they are the same."""
     if isinstance(expression, sp.MatrixSymbol):
         return sp.Symbol(expression.name, real=True)
@@ -44,19 +47,29 @@ def scalar(expression: sp.Basic, inverse: Callable[[sp.Expr], sp.Expr] = lambda 
     return expression
 
 
-_ARRAYS = {scalar(one): name for one, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))}
+_ARRAYS = {
+    scalar(one): name
+    for one, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))
+}
 
 
 def array_name(symbol: sp.Symbol) -> str:
-    """The array that holds a letter of the equations: "lambda" for \\lambda_{k}; predictions take the place of their letter."""
-    return _ARRAYS.get(symbol) or "".join(re.findall(r"[A-Za-z]+", re.sub(r"_\{k(\+1)?\}", "", symbol.name)))
+    """The array that holds a letter of the equations: "lambda" for \\lambda_{k}; predictions take
+    the place of their letter."""
+    return _ARRAYS.get(symbol) or "".join(
+        re.findall(r"[A-Za-z]+", re.sub(r"_\{k(\+1)?\}", "", symbol.name))
+    )
 
 
 def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
-    """The formulas that stand in the equations as h(lambda, Psi), tau(z, p), ..., of a scalar model."""
+    """The formulas that stand in the equations as h(lambda, Psi), tau(z, p), ..., of a scalar
+    model."""
     formulas = structure.formulas
     if formulas is None or structure.model.n != 1 or structure.model.p != 1:
-        raise ValueError(f"only scalar models with derived structural functions are written out, not {structure.model}")
+        raise ValueError(
+            f"only scalar models with derived structural functions are written out, not "
+            f"{structure.model}"
+        )
     values = {}
     for value, (function, mean, cov) in _VALUES.items():
         arguments = formulas.meter_arguments if function in "hGF" else formulas.state_arguments
@@ -71,7 +84,8 @@ def in_numbers(
     structure: Structure | None,
     inverse: Callable[[sp.Expr], sp.Expr] = lambda e: 1 / e,
 ) -> list[Rule]:
-    """The equations of a filter in numbers, letter and value, with the formulas of the model put in."""
+    """The equations of a filter in numbers, letter and value, with the formulas of the model put
+    in."""
     values = function_values(structure) if structure else {}
     for value, equation, state, noises, law, at in (
         (s.a_value, model.state_equation, model.x, model.v, model.state_noise, s.z),

@@ -1,29 +1,38 @@
-r"""A correction that doubts its measurements: noise with heavy tails, and weights instead of a gate.
+r"""A correction that doubts its measurements: noise with heavy tails, and weights instead of a
+gate.
 
-The meter's noise is taken for a Student one, normal with a covariance R / u whose u is drawn anew at each step,
+The meter's noise is taken for a Student one, normal with a covariance R / u whose u is drawn anew
+at each step,
 
     y = h + G (x - lambda) + e,    e | u ~ N(0, R / u),    u ~ Gamma(`degrees` / 2, `degrees` / 2)
 
-The joint law of x and u given y has no closed form.  The nearest product of a law of x and a law of u (variational Bayes) has
+The joint law of x and u given y has no closed form.  The nearest product of a law of x and a law of
+u (variational Bayes) has
 
-    x ~ N(z, p), corrected with R / w,       w = M[u] = (`degrees` + p) / (`degrees` + r^T R^-1 r + tr R^-1 G p G^T)
+    x ~ N(z, p), corrected with R / w,
+    w = M[u] = (`degrees` + p) / (`degrees` + r^T R^-1 r + tr R^-1 G p G^T)
 
-with the residual r = y - h - G (z - lambda), and is found by going round.  A measurement that fits has w of about 1, one that is
-ten standard deviations off next to none, and none is refused for ever.  Piche, Sarkka, Hartikainen (2012).
+with the residual r = y - h - G (z - lambda), and is found by going round.  A measurement that fits
+has w of about 1, one that is ten standard deviations off next to none, and none is refused for
+ever.  Piche, Sarkka, Hartikainen (2012).
 
-Huber's (1964) weights are milder: within an edge c a residual costs its square, beyond it grows only linearly,
+Huber's (1964) weights are milder: within an edge c a residual costs its square, beyond it grows
+only linearly,
 
-    w = min(1, c / sqrt(r^T R^-1 r)):     z minimises (x - lambda)^T Psi^-1 (x - lambda) / 2 + rho(|R^(-1/2) r|)
+    w = min(1, c / sqrt(r^T R^-1 r)):
+        z minimises (x - lambda)^T Psi^-1 (x - lambda) / 2 + rho(|R^(-1/2) r|)
 
 An outlier then still pulls, but with a bounded force.
 
-`adaptive` learns how large the noise is.  It has the covariance s R with an unknown factor s.  After a correction with it the
-residual and what is still unknown of the state make up the noise again,
+`adaptive` learns how large the noise is.  It has the covariance s R with an unknown factor s.
+After a correction with it the residual and what is still unknown of the state make up the noise
+again,
 
     M[r r^T] + G p G^T = s R,        r = y - h - G (z - lambda)
 
-so each measurement tells of s, and a mean that forgets follows it (a round of expectation and maximisation at each step;
-Mohamed and Schwarz, 1999).  What is large for another reason, a manoeuvre or a fault, is taken for noise as well.
+so each measurement tells of s, and a mean that forgets follows it (a round of expectation and
+maximisation at each step; Mohamed and Schwarz, 1999).  What is large for another reason, a
+manoeuvre or a fault, is taken for noise as well.
 """
 
 from __future__ import annotations
@@ -34,32 +43,47 @@ import numpy as np
 
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, log_density, product, transpose, without_missing
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Measurement,
+    apply,
+    correct,
+    gain,
+    log_density,
+    product,
+    transpose,
+    without_missing,
+)
 from kfcourse.symbolic.structure import Structure
 
 
 class Trust(NamedTuple):
-    """What the filter remembers: the weight w of the last measurement, (runs,); NaN where there was none."""
+    """What the filter remembers: the weight w of the last measurement, (runs,); NaN where there was
+    none."""
 
     weight: Array
 
 
-def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: float | None = None) -> Filter:
+def robust(
+    structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: float | None = None
+) -> Filter:
     """The Gaussian-approximated AOF with Student noise in the meter, or with Huber's weights.
 
-    w = 1;  `rounds` times:  K = Psi G^T (G Psi G^T + R / w)^+,  z = lambda + K (y - h),  p = Psi - K G Psi,  then w anew
+    w = 1;  `rounds` times:  K = Psi G^T (G Psi G^T + R / w)^+,  z = lambda + K (y - h),  p = Psi -
+    K G Psi,  then w anew
 
     Parameters
     ----------
     structure : Structure
     degrees : float
-        Of freedom of the meter's noise, above 0: 4 has one measurement in a hundred beyond 4.6 standard deviations of a normal
-        one; at infinity it is `aof(structure)`.
+        Of freedom of the meter's noise, above 0: 4 has one measurement in a hundred beyond 4.6
+        standard deviations of a normal one; at infinity it is `aof(structure)`.
     rounds : int
         Of weighting.
     edge : float, optional
-        Huber's c, above 0, in standard deviations: his weights in the place of Student's.  1.5 is usual; at infinity it is
-        `aof(structure)`.
+        Huber's c, above 0, in standard deviations: his weights in the place of Student's.  1.5 is
+        usual; at infinity it is `aof(structure)`.
 
     Returns
     -------
@@ -93,7 +117,13 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: f
             weight = _weight(expected, state.predicted, posterior, y, degrees, edge)
         posterior = correct(state.predicted, trusted(expected, weight), y)
         missing = np.isnan(y).all(axis=-1)
-        return State(state.step + 1, posterior, now.predict(*posterior), Trust(np.where(missing, np.nan, weight)), expected)
+        return State(
+            state.step + 1,
+            posterior,
+            now.predict(*posterior),
+            Trust(np.where(missing, np.nan, weight)),
+            expected,
+        )
 
     return Filter(f"robust-{structure.name}", structure.model, init, step, structure=structure)
 
@@ -104,23 +134,40 @@ def trusted(expected: Measurement, weight: Array) -> Measurement:
     return expected._replace(F=expected.F - expected.R + R, R=R)
 
 
-def _weight(expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, degrees: float, edge: float | None) -> Array:
+def _weight(
+    expected: Measurement,
+    prior: Gaussian,
+    posterior: Gaussian,
+    y: Array,
+    degrees: float,
+    edge: float | None,
+) -> Array:
     """w, (runs,), at this posterior; 1 where nothing was measured."""
     if edge is not None:
         size = residual_square(expected, prior, posterior, y, unsure=False)
-        return np.minimum(1.0, edge / np.maximum(np.sqrt(size), 1e-300))  # 1 where nothing is left to explain
+        # 1 where nothing is left to explain
+        return np.minimum(1.0, edge / np.maximum(np.sqrt(size), 1e-300))
     present = (~np.isnan(y)).sum(axis=-1)
     size = residual_square(expected, prior, posterior, y)
     return np.where(present > 0, (1 + present / degrees) / (1 + size / degrees), 1.0)
 
 
-def residual_square(expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, unsure: bool = True) -> Array:
-    """r^T R^-1 r, (runs,), of what was measured; with tr R^-1 G p G^T, its mean square over the posterior, by default."""
-    innovation, G, _, R = without_missing(expected.innovation(y), expected.G, expected.F, expected.R)
+def residual_square(
+    expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, unsure: bool = True
+) -> Array:
+    """r^T R^-1 r, (runs,), of what was measured; with tr R^-1 G p G^T, its mean square over the
+    posterior, by default."""
+    innovation, G, _, R = without_missing(
+        expected.innovation(y), expected.G, expected.F, expected.R
+    )
     residual = innovation - apply(G, posterior.mean - prior.mean)
     precision = gain(np.eye(R.shape[-1]), R)
     size = (apply(precision, residual) * residual).sum(axis=-1)
-    return size + (precision * product(product(G, posterior.cov), transpose(G))).sum(axis=(-2, -1)) if unsure else size
+    return (
+        size + (precision * product(product(G, posterior.cov), transpose(G))).sum(axis=(-2, -1))
+        if unsure
+        else size
+    )
 
 
 class Learnt(NamedTuple):
@@ -138,8 +185,8 @@ def adaptive(structure: Structure, window: float = 50.0) -> Filter:
     ----------
     structure : Structure
     window : float
-        Measurements over which the mean forgets, above 1; of one component it knows s to 1 / sqrt(window) of itself.  At
-        infinity it is `aof(structure)`.
+        Measurements over which the mean forgets, above 1; of one component it knows s to 1 /
+        sqrt(window) of itself.  At infinity it is `aof(structure)`.
 
     Returns
     -------
@@ -171,4 +218,11 @@ def adaptive(structure: Structure, window: float = 50.0) -> Filter:
         expected = structure.at(before.step).measure(*before.predicted)
         return log_density(trusted(expected, 1 / before.memory.scale), y)
 
-    return Filter(f"adaptive-{structure.name}", structure.model, init, step, structure=structure, evidence=evidence)
+    return Filter(
+        f"adaptive-{structure.name}",
+        structure.model,
+        init,
+        step,
+        structure=structure,
+        evidence=evidence,
+    )

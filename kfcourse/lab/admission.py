@@ -1,7 +1,9 @@
-"""Which filter may I use?  For a model and each filter: whether it can be built, and what is known of it before any comparison.
+"""Which filter may I use?  For a model and each filter: whether it can be built, and what is known
+of it before any comparison.
 
-A filter is refused if it cannot be built: no closed form, equations that cannot be differentiated, no density.  It is warned of
-if it can be built and will not do: points that do not integrate the equations or do not see a noise, a slope that is zero.
+A filter is refused if it cannot be built: no closed form, equations that cannot be differentiated,
+no density.  It is warned of if it can be built and will not do: points that do not integrate the
+equations or do not see a noise, a slope that is zero.
 """
 
 from __future__ import annotations
@@ -16,7 +18,16 @@ import numpy as np
 from kfcourse.errors import NoClosedForm, Reason, Refused
 from kfcourse.filters import Design, Filter
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, Entry, JumpStructures, Structures, check_names, has_exact, title
+from kfcourse.lab.short_names import (
+    FILTERS,
+    JUMP_FILTERS,
+    Entry,
+    JumpStructures,
+    Structures,
+    check_names,
+    has_exact,
+    title,
+)
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -25,7 +36,8 @@ from kfcourse.symbolic.reading import ModelError
 
 BLIND = 0.5  # of the unexplained variance, that must be seen
 TOO_LONG = (
-    "its formulas are not derived within {:g} s, as the model's are too long; simplify them, or take filters without formulas, "
+    "its formulas are not derived within {:g} s, as the model's are too long; simplify them, or "
+    "take filters without formulas, "
     "aof-unscented and duof"
 )
 
@@ -56,7 +68,8 @@ class Admission:
 
     @property
     def verdict(self) -> str:
-        """Whether it may be used: "yes", "no", or "poor" if it can be built, but there are warnings."""
+        """Whether it may be used: "yes", "no", or "poor" if it can be built, but there are
+        warnings."""
         return "no" if self.built is None else "poor" if self.warnings else "yes"
 
     @property
@@ -70,9 +83,11 @@ def admissions(
     seconds: float | None = None,
     known: Sequence[Admission] = (),
 ) -> list[Admission]:
-    """Which of the filters, all by default, can be built for the model, and what to know of them; each as the lab builds it.
+    """Which of the filters, all by default, can be built for the model, and what to know of them;
+    each as the lab builds it.
 
-    With `seconds`, the formulas of each must be derived in that time.  What is `known` of a filter is not asked again.
+    With `seconds`, the formulas of each must be derived in that time.  What is `known` of a filter
+    is not asked again.
 
     Raises
     ------
@@ -89,7 +104,9 @@ def admissions(
             continue
         # filters with the same structural functions share the time
         late = [a for a in answers.values() if getattr(a.reason, "kind", "") == "too_long"]
-        reason = next((a.reason for a in late if entries[a.name].functions == entries[name].functions), None)
+        reason = next(
+            (a.reason for a in late if entries[a.name].functions == entries[name].functions), None
+        )
         if reason is None:
             try:
                 with nullcontext() if seconds is None else time_limit(seconds):
@@ -110,8 +127,12 @@ def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) 
             return Admission(name, None, error.with_traceback(None))
         faults = [str(warning.message) for warning in caught]
         if isinstance(structures, Structures):
-            faults += {"linearised": _flat, "unscented": _blind}.get(entry.functions, lambda _: iter(()))(structures)
-        return Admission(name, built, "", tuple(faults), () if faults else tuple(_remarks(entry, structures)))
+            faults += {"linearised": _flat, "unscented": _blind}.get(
+                entry.functions, lambda _: iter(())
+            )(structures)
+        return Admission(
+            name, built, "", tuple(faults), () if faults else tuple(_remarks(entry, structures))
+        )
 
 
 def _remarks(entry: Entry, structures: Structures | JumpStructures) -> Iterator[str]:
@@ -122,7 +143,10 @@ def _remarks(entry: Entry, structures: Structures | JumpStructures) -> Iterator[
         if isinstance(structures.quadrature, Checked):
             yield structures.quadrature.says
         elif structures.quadrature is not None:
-            yield "with linearised structural functions, as Gaussian ones cannot be had: see aof-jump-gaussian"
+            yield (
+                "with linearised structural functions, as Gaussian ones cannot be had: see "
+                "aof-jump-gaussian"
+            )
 
 
 def _flat(structures: Structures) -> Iterator[str]:
@@ -131,7 +155,10 @@ def _flat(structures: Structures) -> Iterator[str]:
     slope = structures.linearised.at(0).measure(model.prior.mean, model.prior.cov).G
     for name, row in zip(model.measured, np.broadcast_to(slope, (model.p, model.n)), strict=True):
         if not row.any():
-            yield f"the tangent of {name} at the prior's mean is level: the first measurement tells it nothing"
+            yield (
+                f"the tangent of {name} at the prior's mean is level: the first measurement "
+                f"tells it nothing"
+            )
 
 
 def _blind(structures: Structures) -> Iterator[str]:
@@ -147,12 +174,21 @@ def _blind(structures: Structures) -> Iterator[str]:
             except ModelError:
                 return
         points = unscented(model)
-    seen, there = ([now.measure(*model.prior).R, now.predict(*model.prior).cov] for now in (points.at(0), full.at(0)))
-    for what, part, whole in zip(("the measurement that the state does not explain", "the next state"), seen, there, strict=True):
+    seen, there = (
+        [now.measure(*model.prior).R, now.predict(*model.prior).cov]
+        for now in (points.at(0), full.at(0))
+    )
+    for what, part, whole in zip(
+        ("the measurement that the state does not explain", "the next state"),
+        seen,
+        there,
+        strict=True,
+    ):
         share = np.diagonal(np.broadcast_to(part, whole.shape)) / np.diagonal(whole)
         if (worst := np.nanmin(share, initial=1.0)) < BLIND:
             yield (
-                f"its points lie on the axes and see {100 * max(worst, 0.0):.0f} % of the variance of {what} at the prior law: "
+                f"its points lie on the axes and see {100 * max(worst, 0.0):.0f} % of the "
+                f"variance of {what} at the prior law: "
                 "products such as x**2*w are 0 on them; aof-gauss-hermite sees them"
             )
 
@@ -161,4 +197,7 @@ def table(answers: Sequence[Admission]) -> str:
     """What `kfcourse filters` prints: a line for each filter."""
     rows = [(answer.name, title(answer.name), answer.verdict, answer.says) for answer in answers]
     widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:3]]
-    return "\n".join("  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]).rstrip() for row in rows)
+    return "\n".join(
+        "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]).rstrip()
+        for row in rows
+    )

@@ -1,9 +1,11 @@
-"""Normal moments where they have no closed form: Gauss-Hermite quadrature of an order that has been checked.
+"""Normal moments where they have no closed form: Gauss-Hermite quadrature of an order that has been
+checked.
 
-A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points it takes depends on how
-wide the laws are that occur.  So the AOF runs over a pilot's trajectories with some order and with twice that order; the order
-is raised until both estimate the same.  A model with modes has one order for all modes without formulas, each checked on
-trajectories of its own.
+A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points
+it takes depends on how wide the laws are that occur.  So the AOF runs over a pilot's trajectories
+with some order and with twice that order; the order is raised until both estimate the same.  A
+model with modes has one order for all modes without formulas, each checked on trajectories of its
+own.
 """
 
 from __future__ import annotations
@@ -27,15 +29,17 @@ from kfcourse.symbolic.quadrature import QuadratureWarning, axes, gauss_hermite
 from kfcourse.symbolic.structure import Structure, gaussian
 
 ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
-# Estimates may change by this part of their deviation when the order is doubled, variances by this part of themselves: root mean
-# square over the trajectories of a step.  The error variance then changes by 0.02 % at most.
+# Estimates may change by this part of their deviation when the order is doubled, variances by this
+# part of themselves: root mean square over the trajectories of a step.  The error variance then
+# changes by 0.02 % at most.
 CLOSE = 1e-4
 RUNS, STEPS = 100, 20  # of the pilot
 MOST = 200  # points together: with more, a comparison takes a quarter of an hour (343 points, D3)
 
 
 class Checked(NamedTuple):
-    """Structures by quadrature, a structure for each mode; where a mode has formulas they are these.
+    """Structures by quadrature, a structure for each mode; where a mode has formulas they are
+    these.
 
     They are named "gaussian", as what they compute is; `order` is their number of points an axis,
     `apart` the largest difference that the pilot found, in the measure of `CLOSE`.
@@ -48,8 +52,10 @@ class Checked(NamedTuple):
     @property
     def says(self) -> str:
         return (
-            f"no closed form: means over normal laws by Gauss-Hermite quadrature, {self.order} points an axis; on the laws of a "
-            f"pilot twice as many change nothing by more than {self.apart:.0e} of a standard deviation"
+            f"no closed form: means over normal laws by Gauss-Hermite quadrature, {self.order} "
+            f"points an axis; on the laws of a "
+            f"pilot twice as many change nothing by more than {self.apart:.0e} of a standard "
+            f"deviation"
         )
 
 
@@ -67,19 +73,38 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
     problem = ""
     for order in ORDERS:
         if (points := order**size) > MOST:
-            problem += f"; {order} points on each of {size} axes are {points}, more than the {MOST} with which a comparison ends"
+            problem += (
+                f"; {order} points on each of {size} axes are {points}, more than the "
+                f"{MOST} with which a comparison ends"
+            )
             break
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
-                warnings.simplefilter("ignore", QuadratureWarning)  # the pilot looks at more than the prior law
-                coarse = {j: replace(gauss_hermite(mode, order), name="gaussian") for j, mode in without.items()}
-                apart = float(np.max([_apart(coarse[j], gauss_hermite(mode, 2 * order)) for j, mode in without.items()]))
+                # the pilot looks at more than the prior law
+                warnings.simplefilter("ignore", QuadratureWarning)
+                coarse = {
+                    j: replace(gauss_hermite(mode, order), name="gaussian")
+                    for j, mode in without.items()
+                }
+                apart = float(
+                    np.max(
+                        [
+                            _apart(coarse[j], gauss_hermite(mode, 2 * order))
+                            for j, mode in without.items()
+                        ]
+                    )
+                )
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
             continue
         if apart <= CLOSE:
-            return Checked([structure or coarse[j] for j, structure in structures.items()], order, apart)
+            return Checked(
+                [structure or coarse[j] for j, structure in structures.items()], order, apart
+            )
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
-        problem = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
+        problem = (
+            f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on "
+            f"the laws that occur"
+        )
     raise NoClosedForm(f"{why}{problem}", why.kind, **why.parts)
 
 
@@ -91,14 +116,17 @@ def _formulas(model: Model) -> Structure | None:
 
 
 def _apart(coarse: Structure, fine: Structure) -> float:
-    """How far the AOF by the first is from that by the second at most, in the measure of `CLOSE`; NaN if an estimate is."""
+    """How far the AOF by the first is from that by the second at most, in the measure of `CLOSE`;
+    NaN if an estimate is."""
     model = coarse.model
     y = simulate(model, RUNS, int(min(STEPS, model.known.steps)), seed=1).y
     if not np.isfinite(y).all():
         raise NotFinite("trajectories become infinite")
     less, more = (run(aof(structure), y) for structure in (coarse, fine))
     # what does not vary has no size of its own but that of rounding
-    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0)) + 1e-12 * (1 + np.abs(more.mean))
+    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0)) + 1e-12 * (
+        1 + np.abs(more.mean)
+    )
     shift = difference(less.mean, more.mean, model.angles.x) / sd
     spread = (less.cov - more.cov) / (sd[..., :, None] * sd[..., None, :])
     return float(np.max([np.sqrt((part**2).mean(axis=1)).max() for part in (shift, spread)]))

@@ -1,7 +1,8 @@
-"""The families of filters: what each is called, in both languages, and how it is drawn.  One record a family.
+"""The families of filters: what each is called, in both languages, and how it is drawn.  One record
+a family.
 
-Filters of a family share its equations (`kfcourse.filters.EQUATIONS`, by the same name), colour and marker, and differ in
-their structural functions (dashes) or in the length of their memory.
+Filters of a family share its equations (`kfcourse.filters.EQUATIONS`, by the same name), colour and
+marker, and differ in their structural functions (dashes) or in the length of their memory.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ class Family(NamedTuple):
     """Names of a family and its look in figures.
 
     title, russian            in tables: "FOS", "ФОС"
-    heading, russian_heading  of the section with its equations in reports; "" if `EQUATIONS` has none of it
+    heading, russian_heading  of the section with its equations in reports; "" if `EQUATIONS` has
+    none of it
     colour, marker            Matplotlib's
     """
 
@@ -25,7 +27,8 @@ class Family(NamedTuple):
     marker: str = "."
 
 
-# In the order of the course.  Okabe and Ito's colours and Tol's muted ones, and darker ones for those that are faint on paper.
+# In the order of the course.  Okabe and Ito's colours and Tol's muted ones, and darker ones for
+# those that are faint on paper.
 FAMILIES: dict[str, Family] = {
     "kalman": Family("Kalman", "ФК", colour="#000000", marker="x"),
     "aof": Family(
@@ -44,7 +47,14 @@ FAMILIES: dict[str, Family] = {
         "#D55E00",
         "s",
     ),
-    "fos": Family("FOS", "ФОС", "FOS, the filter of optimal structure", "Фильтр оптимальной структуры (ФОС)", "#009E73", "^"),
+    "fos": Family(
+        "FOS",
+        "ФОС",
+        "FOS, the filter of optimal structure",
+        "Фильтр оптимальной структуры (ФОС)",
+        "#009E73",
+        "^",
+    ),
     "mfos": Family(
         "MFOS",
         "МФОС",
@@ -69,7 +79,14 @@ FAMILIES: dict[str, Family] = {
         "#590059",
         ">",
     ),
-    "fkp": Family("FKP", "ФКП", "FKP, the filter with finite memory", "Фильтр с конечной памятью (ФКП)", "#117733", "p"),
+    "fkp": Family(
+        "FKP",
+        "ФКП",
+        "FKP, the filter with finite memory",
+        "Фильтр с конечной памятью (ФКП)",
+        "#117733",
+        "p",
+    ),
     "mfkp": Family(
         "MFKP",
         "МФКП",
@@ -94,7 +111,14 @@ FAMILIES: dict[str, Family] = {
         "#332288",
         "8",
     ),
-    "fbp": Family("FBP", "ФБП", "FBP, the filter of high order", "Фильтр большого порядка (ФБП)", "#661100", "X"),
+    "fbp": Family(
+        "FBP",
+        "ФБП",
+        "FBP, the filter of high order",
+        "Фильтр большого порядка (ФБП)",
+        "#661100",
+        "X",
+    ),
     "particle": Family("particle", "АОФ (частицы)", colour="#4C3900", marker="*"),
     "imm": Family("IMM", "АОФлд (смешивание до прогноза)", colour="#D55E00"),
     "gpb2": Family("GPB2", "АОФлд (пары режимов)", colour="#009E73"),

@@ -1,12 +1,13 @@
-"""New variants, proposed from a grammar of state and meter equations and kept if they are well posed.
+"""New variants, proposed from a grammar of state and meter equations and kept if they are well
+posed.
 
 ::
 
     scalar  ->  x' = drift + object_noise,   y = signal + meter_noise
     vector  ->  x1' = x1 + T*x2,  x2' = x2 + T*(force) + s*v1,   y = vector_meters
 
-grammar.toml has the pieces, with the ranges of their parameters.  The i-th candidate of a seed draws
-from a stream of its own, so the same seed proposes the same variants, whatever the number of
+grammar.toml has the pieces, with the ranges of their parameters.  The i-th candidate of a seed
+draws from a stream of its own, so the same seed proposes the same variants, whatever the number of
 processes.
 """
 
@@ -28,7 +29,9 @@ from kfcourse.lab.quality import Ask, Quality, examine
 from kfcourse.lab.variants import RUNS, Variant, read_variant
 from kfcourse.montecarlo import FEWEST
 
-PIECES = tomllib.loads((resources.files("kfcourse.lab") / "grammar.toml").read_text(encoding="utf-8"))
+PIECES = tomllib.loads(
+    (resources.files("kfcourse.lab") / "grammar.toml").read_text(encoding="utf-8")
+)
 SCREEN = 10  # a candidate is first tried on that many times fewer trajectories: most are none
 CHUNK = 12  # candidates that are judged at once; of the last ones some are judged in vain
 SHAPES = 50  # up to so many variants all formulas are different; each so many more repeat once more
@@ -44,7 +47,8 @@ class Generated(NamedTuple):
     def toml(self) -> str:
         """The variants as the text of a file that `load_variants` reads."""
         return "\n".join(
-            f"[variants.{variant.name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in variant.table.items())
+            f"[variants.{variant.name}]\n"
+            + "".join(f"{key} = {_value(value)}\n" for key, value in variant.table.items())
             for variant in self.variants
         )
 
@@ -98,7 +102,9 @@ def _value(value: Any) -> str:
     return json.dumps(value)  # strings, numbers and lists of them are the same in JSON and TOML
 
 
-def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None) -> Generated:
+def generate(
+    wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None
+) -> Generated:
     """Well-posed variants g1, g2, ...: candidates in order, without those that repeat formulas.
 
     Parameters

@@ -3,7 +3,8 @@
 ::
 
     cells = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
-    cells[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
+    cells[0.05, 0.02].leaders(1)
+        the most accurate at step 1, and those that are not significantly worse
     draw(cells, 1, ax)                all of them as a map
 """
 
@@ -66,7 +67,10 @@ def parameter_map(
         Not two parameters, or one that the model lacks.
     """
     if len(values) != 2 or not set(values) <= set(model.parameters):
-        raise ValueError(f"a map needs values of two of the parameters {', '.join(model.parameters)}, got {', '.join(values)}")
+        raise ValueError(
+            f"a map needs values of two of the parameters {', '.join(model.parameters)}, got "
+            f"{', '.join(values)}"
+        )
     first, second = values
     cells = {}
     for a in values[first]:
@@ -86,7 +90,8 @@ def parameter_map(
 
 
 def draw(cells: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENCE) -> Axes:
-    """The map at a step: in each cell the most accurate filter and its distance from the bound, the least accurate and its.
+    """The map at a step: in each cell the most accurate filter and its distance from the bound, the
+    least accurate and its.
 
     "GAOF, 2 more": two others are not significantly worse than the most accurate.
     """
@@ -97,11 +102,21 @@ def draw(cells: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENC
         best, *others = result.leaders(step, confidence)
         worst = max(gaps, key=lambda name: float(gaps[name].value))
         more = f", {len(others)} more" if others else ""
-        ax.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, color=style(best)["color"], alpha=0.25 if others else 0.5, linewidth=0))
+        ax.add_patch(
+            Rectangle(
+                (x - 0.5, y - 0.5),
+                1,
+                1,
+                color=style(best)["color"],
+                alpha=0.25 if others else 0.5,
+                linewidth=0,
+            )
+        )
         ax.text(
             x,
             y,
-            f"{title(best)}{more}\n{percent(gaps[best])} %\n\nlast {title(worst)}\n{percent(gaps[worst])} %",
+            f"{title(best)}{more}\n{percent(gaps[best])} %\n\nlast "
+            f"{title(worst)}\n{percent(gaps[worst])} %",
             ha="center",
             va="center",
             fontsize="small",

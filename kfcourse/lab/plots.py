@@ -1,4 +1,5 @@
-"""Figures of the lab: functions (result, ax) -> ax, with one colour and one name for each filter."""
+"""Figures of the lab: functions (result, ax) -> ax, with one colour and one name for each
+filter."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from kfcourse.montecarlo.statistics import Estimate
 
 
 class Words(NamedTuple):
-    """What the figures say: the names of filters and the axes, {name} for the filter that is the zero line."""
+    """What the figures say: the names of filters and the axes, {name} for the filter that is the
+    zero line."""
 
     title: Callable[[str], str] = title
     step: str = "step $k$"
@@ -36,10 +38,16 @@ DASHES = {"linearised": "--", "unscented": ":", "gauss-hermite": "-.", "averaged
 
 
 def style(name: str) -> dict[str, Any]:
-    """Line style of a filter: colour and marker by family, dashes by structural functions, black for the exact."""
+    """Line style of a filter: colour and marker by family, dashes by structural functions, black
+    for the exact."""
     known = entry(name)
     colour, marker = ("black", "*") if known.functions == "exact" else look(known.drawn)
-    return {"color": colour, "linestyle": DASHES.get(known.functions, "-"), "marker": marker, "label": known.title}
+    return {
+        "color": colour,
+        "linestyle": DASHES.get(known.functions, "-"),
+        "marker": marker,
+        "label": known.title,
+    }
 
 
 def _labelled(ax: Axes, ylabel: str, words: Words = ENGLISH) -> Axes:
@@ -52,7 +60,13 @@ def _labelled(ax: Axes, ylabel: str, words: Words = ENGLISH) -> Axes:
 
 
 def _curve(
-    ax: Axes, name: str, k: Array, estimate: Estimate, words: Words, confidence: float | None = None, scale: float = 1
+    ax: Axes,
+    name: str,
+    k: Array,
+    estimate: Estimate,
+    words: Words,
+    confidence: float | None = None,
+    scale: float = 1,
 ) -> None:
     """A filter's estimates over the steps k, with a band of confidence."""
     line = style(name) | {"label": words.title(name)}
@@ -62,7 +76,9 @@ def _curve(
         ax.fill_between(k, scale * low, scale * high, color=line["color"], alpha=0.15, linewidth=0)
 
 
-def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:
+def accuracy(
+    result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH
+) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
     ax.set_yscale("log")
     for name in names or result.names:
@@ -79,29 +95,45 @@ def relative_accuracy(
     confidence: float = CONFIDENCE,
     words: Words = ENGLISH,
 ) -> Axes:
-    """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands of confidence.
+    """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands
+    of confidence.
 
     Without the exact AOF the control (the Gaussian AOF) is the zero line.
     """
     zero = words.title(result.reference)
     for name in result.entrants if names is None else names:
         if name != result.reference:
-            _curve(ax, name, np.arange(result.steps)[steps], result.gap(name)[steps], words, confidence, 100)
+            _curve(
+                ax,
+                name,
+                np.arange(result.steps)[steps],
+                result.gap(name)[steps],
+                words,
+                confidence,
+                100,
+            )
     ax.axhline(0, color="black", linewidth=0.8, label=zero)
     ax.grid(True, alpha=0.3)
     return _labelled(ax, words.above.replace("{name}", zero), words)
 
 
 def ranking(
-    result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = CONFIDENCE, words: Words = ENGLISH
+    result: Comparison,
+    ax: Axes,
+    steps: slice = slice(None),
+    confidence: float = CONFIDENCE,
+    words: Words = ENGLISH,
 ) -> Axes:
-    """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best on top, with intervals."""
+    """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best
+    on top, with intervals."""
     ranked = result.ranking(steps)[::-1]
     for row, (name, gap) in enumerate(ranked):
         line, middle = style(name), float(gap.value)
         low, high = gap.interval(confidence)
         ends = 100 * np.array([[middle - low], [high - middle]])
-        ax.errorbar(100 * middle, row, xerr=ends, fmt=line["marker"], color=line["color"], capsize=3)
+        ax.errorbar(
+            100 * middle, row, xerr=ends, fmt=line["marker"], color=line["color"], capsize=3
+        )
     ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
     ax.set_xlabel(words.mean_above.replace("{name}", words.title(result.reference)))
@@ -110,9 +142,14 @@ def ranking(
 
 
 def consistency(
-    result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = CONFIDENCE, words: Words = ENGLISH
+    result: Comparison,
+    ax: Axes,
+    names: Sequence[str] | None = None,
+    confidence: float = CONFIDENCE,
+    words: Words = ENGLISH,
 ) -> Axes:
-    """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is right."""
+    """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is
+    right."""
     for name in names or result.names:
         _curve(ax, name, np.arange(result.steps), result.normalised_error(name), words, confidence)
     ax.axhline(1, color="black", linewidth=0.8)
@@ -122,13 +159,26 @@ def consistency(
 
 
 def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> Axes:
-    """Probabilities of all modes but the first against the step, on one trajectory, and the true mode."""
+    """Probabilities of all modes but the first against the step, on one trajectory, and the true
+    mode."""
     steps, size = np.arange(len(modes.mode)), next(iter(modes.probability.values())).shape[1]
     dashes = ("-", "--", ":", "-.")
-    ax.fill_between(steps, modes.mode / (size - 1) if size > 1 else 0 * steps, step="mid", color="#dddddd", linewidth=0)
+    ax.fill_between(
+        steps,
+        modes.mode / (size - 1) if size > 1 else 0 * steps,
+        step="mid",
+        color="#dddddd",
+        linewidth=0,
+    )
     for name, probability in modes.probability.items():
         for j in range(1, size):
             label = words.title(name) + (f", $j={j + 1}$" if size > 2 else "")
-            ax.plot(steps, probability[:, j], color=style(name)["color"], linestyle=dashes[(j - 1) % 4], label=label)
+            ax.plot(
+                steps,
+                probability[:, j],
+                color=style(name)["color"],
+                linestyle=dashes[(j - 1) % 4],
+                label=label,
+            )
     ax.set_ylim(-0.02, 1.02)
     return _labelled(ax, words.mode, words)

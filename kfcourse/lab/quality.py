@@ -52,7 +52,8 @@ SECONDS = 60.0  # for the derivation
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment
 DIVERGED = 10.0  # a filter's error variance over that without measurements
-UNSEEN = 0.9  # the best filter's error variance over that without measurements, when the meter tells too little
+# the best filter's error variance over that without measurements, when the meter tells too little
+UNSEEN = 0.9
 SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
@@ -126,7 +127,9 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
             with time_limit(SECONDS):
                 answers = solvable(Structures(model))
         except OutOfTime:
-            late = f"the structural functions are not found in {SECONDS:g} s; simplify the equations"
+            late = (
+                f"the structural functions are not found in {SECONDS:g} s; simplify the equations"
+            )
             return Quality(variant.name, {"solvable": Finding(False, late)})
         if answers.ok and ask:
             answers = ask(variant) or answers
@@ -136,7 +139,12 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
         linear = model.between is None and is_linear(model)
         remarks = {"linear: the Kalman filter is exact": linear, "decays to a constant": decays}
         findings = _simulated(model, x, seed) | {"solvable": answers}
-        return Quality(variant.name, findings, linear, tuple(remark for remark, holds in remarks.items() if holds))
+        return Quality(
+            variant.name,
+            findings,
+            linear,
+            tuple(remark for remark, holds in remarks.items() if holds),
+        )
 
 
 def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
@@ -146,20 +154,28 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     moments = bounded(x)
     if moments.ok:
         laws = {name: getattr(model, name) for name in ("prior", "state_noise", "meter_noise")}
-        larger: dict[str, Any] = {name: Gaussian(law.mean, STRESS**2 * law.cov) for name, law in laws.items()}
-        if not np.isfinite(simulate(dataclasses.replace(model, **larger), runs, steps, seed).x).all():
+        larger: dict[str, Any] = {
+            name: Gaussian(law.mean, STRESS**2 * law.cov) for name, law in laws.items()
+        }
+        if not np.isfinite(
+            simulate(dataclasses.replace(model, **larger), runs, steps, seed).x
+        ).all():
             rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"
             moments = Finding(False, f"{rare}, so a few of very many will", moments.value)
     if not moments.ok or not filters:
         return {"bounded": moments}
     try:
-        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False)
+        result = compare(
+            [*filters, unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False
+        )
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
     return {
         "bounded": not_diverging(result) or moments,
         "observable": observable(result, x),
-        "filters differ": differences(result, [built.name for built in filters if isinstance(built, Design)]),
+        "filters differ": differences(
+            result, [built.name for built in filters if isinstance(built, Design)]
+        ),
     }
 
 
@@ -182,16 +198,25 @@ def examine_all(
 
 
 LEGEND = """
-observable      error variance of the best filter in per cent of the variance without measurements, worst component
+observable
+    error variance of the best filter, % of the variance without measurements, worst component
 filters differ  the largest significant difference of two filters' error variances, relative"""
 
 
 def table(qualities: Sequence[Quality]) -> str:
-    """What `kfcourse variants --check` prints: a line for each variant, then what is not well posed."""
+    """What `kfcourse variants --check` prints: a line for each variant, then what is not well
+    posed."""
     rows = [("variant", *CRITERIA, "remarks"), *map(_row, qualities)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    reasons = [f"variant {q.name} is not well posed, {fault}: {why}" for q in qualities for fault, why in q.faults.items()]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    reasons = [
+        f"variant {q.name} is not well posed, {fault}: {why}"
+        for q in qualities
+        for fault, why in q.faults.items()
+    ]
     return "\n".join([*lines, LEGEND, *([""] if reasons else []), *reasons])
 
 
@@ -209,35 +234,51 @@ def _row(quality: Quality) -> tuple[str, ...]:
 
 
 def bounded(x: Array) -> Finding:
-    """Whether the second moments of trajectories x (steps, runs, n) stay in bounds.  Value: their growth.
+    """Whether the second moments of trajectories x (steps, runs, n) stay in bounds.  Value: their
+    growth.
 
-    The maximum of M x_k^2 over the second half of the steps is at most GROWTH times that over the first half, for every
-    component; and the sum of squared deviations u = x - M x is not that of a few trajectories,
+    The maximum of M x_k^2 over the second half of the steps is at most GROWTH times that over the
+    first half, for every component; and the sum of squared deviations u = x - M x is not that of a
+    few trajectories,
     (sum u^2)^2 / sum u^4 >= CARRIERS.
     """
     finite = np.isfinite(x**4).all(axis=(1, 2))
     if not finite.all():
-        return Finding(False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf"))
+        return Finding(
+            False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf")
+        )
     square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
-    growth = float(ratio(square[half:].max(axis=0, initial=0.0), square[:half].max(axis=0), 0.0).max())  # of a single step 0
-    grows = f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
+    # of a single step 0
+    growth = float(
+        ratio(square[half:].max(axis=0, initial=0.0), square[:half].max(axis=0), 0.0).max()
+    )
+    grows = (
+        f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
+    )
     if growth > GROWTH:
         return Finding(False, grows, growth)
     u = x - x.mean(axis=1, keepdims=True)
-    carriers = ratio((u**2).sum(axis=1) ** 2, (u**4).sum(axis=1), CARRIERS)[varies(x)].min(initial=np.inf)
+    carriers = ratio((u**2).sum(axis=1) ** 2, (u**4).sum(axis=1), CARRIERS)[varies(x)].min(
+        initial=np.inf
+    )
     if carriers < CARRIERS:
-        few = f"the second moment is that of {carriers:.1f} trajectories of {x.shape[1]}: too heavy tails"
+        few = (
+            f"the second moment is that of {carriers:.1f} trajectories of {x.shape[1]}: too "
+            f"heavy tails"
+        )
         return Finding(False, few, growth)
     return Finding(True, grows, growth)
 
 
 def varies(x: Array) -> Array:
-    """Whether a component of x (steps, runs, n) varies at a step, by more than rounding: (steps, n)."""
+    """Whether a component of x (steps, runs, n) varies at a step, by more than rounding: (steps,
+    n)."""
     return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
 
 
 def unmeasured(model: Model, x: Array) -> Filter:
-    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs, n)."""
+    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs,
+    n)."""
     means = x.mean(axis=1)
     u = x - means[:, None]
     covs = np.einsum("kri,krj->kij", u, u) / x.shape[1]
@@ -255,27 +296,39 @@ def measured(comparison: Comparison) -> list[str]:
 
 
 def shares(comparison: Comparison, name: str) -> Estimate:
-    """Error variance of a filter over that without measurements, mean over the steps, for each component: (n,).
+    """Error variance of a filter over that without measurements, mean over the steps, for each
+    component: (n,).
 
-    Steps where the component does not vary are left out; a component that never varies has the share 1.
+    Steps where the component does not vary are left out; a component that never varies has the
+    share 1.
     """
     squares = comparison.sums.means("square")
     square, base = (squares[comparison.names.index(key)] for key in (name, UNMEASURED))
     used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
-    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(
+        used.sum(axis=0), 1
+    )
     return Estimate.jackknife(np.where(used.any(axis=0), share, 1.0))
 
 
 def not_diverging(comparison: Comparison) -> Finding | None:
     """The filter that is DIVERGED times worse than no measurements; None if there is none."""
-    worst, name = max((float(shares(comparison, name).value.max()), name) for name in measured(comparison))
+    worst, name = max(
+        (float(shares(comparison, name).value.max()), name) for name in measured(comparison)
+    )
     if worst <= DIVERGED:
         return None
-    return Finding(False, f"{title(name)} diverges: its error variance is {worst:.3g} times that without measurements", worst)
+    return Finding(
+        False,
+        f"{title(name)} diverges: its error variance is {worst:.3g} times that without "
+        f"measurements",
+        worst,
+    )
 
 
 def observable(comparison: Comparison, x: Array) -> Finding:
-    """Whether the meter tells something about every component of the state.  Value: the worst component's share.
+    """Whether the meter tells something about every component of the state.  Value: the worst
+    component's share.
 
     The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN.
     """
@@ -286,24 +339,38 @@ def observable(comparison: Comparison, x: Array) -> Finding:
     share = float(min(estimate.value[worst] for estimate in estimates))
     constant = ~varies(x).any(axis=0)
     if constant.any():
-        return Finding(False, f"{names[int(np.argmax(constant))]} does not vary, there is nothing to estimate", share)
+        return Finding(
+            False,
+            f"{names[int(np.argmax(constant))]} does not vary, there is nothing to estimate",
+            share,
+        )
     left = f"the best filter leaves {100 * share:.3g} % of the variance of {names[worst]}"
-    return Finding(True, left, share) if upper[worst] < UNSEEN else Finding(False, f"the meter hardly tells: {left}", share)
+    return (
+        Finding(True, left, share)
+        if upper[worst] < UNSEEN
+        else Finding(False, f"the meter hardly tells: {left}", share)
+    )
 
 
 def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
-    """Whether two filters differ in error variance by more than the statistical error, at a step or on average.
+    """Whether two filters differ in error variance by more than the statistical error, at a step or
+    on average.
 
-    |D_a - D_b| > t SE + c D / runs.  t is Student's quantile of SIGNIFICANCE, shared by all pairs and steps (Bonferroni).  The
-    second term is for the `designed` filters, whose coefficients are fitted over as many trajectories: each costs 1/runs of the
-    error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value: the largest significant
-    difference, relative to the error variance of the control.
+    |D_a - D_b| > t SE + c D / runs.  t is Student's quantile of SIGNIFICANCE, shared by all pairs
+    and steps (Bonferroni).  The second term is for the `designed` filters, whose coefficients are
+    fitted over as many trajectories: each costs 1/runs of the
+    error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value:
+    the largest significant difference, relative to the error variance of the control.
     """
     pairs = list(combinations(measured(comparison), 2))
     tests = max(len(pairs), 1) * (comparison.steps + 1)
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
     control = comparison.error_variance(comparison.control).value
-    largest, says = 0.0, f"no two filters differ by more than the statistical error of {comparison.runs} trajectories"
+    largest, says = (
+        0.0,
+        f"no two filters differ by more than the statistical error of {comparison.runs} "
+        f"trajectories",
+    )
     for pair in pairs:
         difference, score = comparison.difference(*pair), comparison.mean_gap_difference(*pair)
         relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
@@ -319,7 +386,8 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
 
 
 def solvable(structures: Structures) -> Finding:
-    """Whether the structural functions have a closed form of sensible length.  Value: operations of the Gaussian ones."""
+    """Whether the structural functions have a closed form of sensible length.  Value: operations of
+    the Gaussian ones."""
     try:
         parts = [structures.gaussian[name] for name in ("tau", "Theta", "h", "G", "F")]
         _ = structures.linearised
@@ -327,4 +395,8 @@ def solvable(structures: Structures) -> Finding:
         return Finding(False, str(error))
     operations = sum(int(formula.count_ops()) for formula in sp.flatten(parts))
     says = f"closed form, {operations} operations in the Gaussian structural functions"
-    return Finding(operations <= LONGEST, says + ("" if operations <= LONGEST else f", more than {LONGEST}"), float(operations))
+    return Finding(
+        operations <= LONGEST,
+        says + ("" if operations <= LONGEST else f", more than {LONGEST}"),
+        float(operations),
+    )

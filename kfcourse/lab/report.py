@@ -1,8 +1,10 @@
-"""The report of the lab (отчёт по лабораторной работе), in English or Russian: from the task to the conclusion.
+"""The report of the lab (отчёт по лабораторной работе), in English or Russian: from the task to the
+conclusion.
 
-`write_report` writes report.html (opens in any browser, without a network), report.tex and their figures; `write_json` the
-numbers.  The words of both languages are in report.toml; formulas, numbers and verdicts come from the model and the comparison
-(`report_sections`, `report_plain`; with modes `report_modes`).
+`write_report` writes report.html (opens in any browser, without a network), report.tex and their
+figures; `write_json` the
+numbers.  The words of both languages are in report.toml; formulas, numbers and verdicts come from
+the model and the comparison (`report_sections`, `report_plain`; with modes `report_modes`).
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ WORDS = tomllib.loads((resources.files("kfcourse.lab") / "report.toml").read_tex
 LANGUAGES = tuple(WORDS)
 RECOGNISED = 1600  # trajectories on which modes are told
 STANDARD_OUTPUT = ("-", "/dev/stdout")
-ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)  # the line's own &
+# the line's own &
+ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
@@ -76,7 +79,8 @@ def write_report(
 ) -> list[Path]:
     """Write report.tex, report.html and their figures, all of them or none; returns the paths.
 
-    `known` are the filters that the model may admit, of which the report has a table; `modes` are the `recognised_modes`.
+    `known` are the filters that the model may admit, of which the report has a table; `modes` are
+    the `recognised_modes`.
 
     Raises
     ------
@@ -87,20 +91,35 @@ def write_report(
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     report = _report(result, language, modes)
     report.known = known
-    content = {"blocks": list(report.blocks()), "words": report.words, "variant": variant, "language": language}
-    labels = plots.Words(report.title, **{part: report.words[f"axis_{part}"] for part in plots.Words._fields[1:]})
+    content = {
+        "blocks": list(report.blocks()),
+        "words": report.words,
+        "variant": variant,
+        "language": language,
+    }
+    labels = plots.Words(
+        report.title, **{part: report.words[f"axis_{part}"] for part in plots.Words._fields[1:]}
+    )
     with replacing_together(folder) as place:
         for name in report.figures:
             save_figure(partial(FIGURES[name], result, words=labels), place, name)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "modes")
-        save_texts(("report.html", "report.tex"), place, content, inline=inline_html, inline_tex=inline_tex)
+        save_texts(
+            ("report.html", "report.tex"), place, content, inline=inline_html, inline_tex=inline_tex
+        )
         return [folder / path.name for path in place.iterdir()]
 
 
-def _report(result: Comparison, language: str = "en", modes: Recognised | None = None) -> StudentReport:
+def _report(
+    result: Comparison, language: str = "en", modes: Recognised | None = None
+) -> StudentReport:
     words = WORDS[language]
-    return JumpReport(result, words, modes) if isinstance(result.model, JumpModel) else PlainReport(result, words)
+    return (
+        JumpReport(result, words, modes)
+        if isinstance(result.model, JumpModel)
+        else PlainReport(result, words)
+    )
 
 
 def remarks_in_words(result: Comparison) -> list[str]:
@@ -109,34 +128,53 @@ def remarks_in_words(result: Comparison) -> list[str]:
 
 
 def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
-    """A figure for the page and for LaTeX, its legend below it, where no curve runs; the same numbers give the same files."""
+    """A figure for the page and for LaTeX, its legend below it, where no curve runs; the same
+    numbers give the same files."""
     figure = Figure(figsize=(7, 4.2), layout="constrained")
     ax = figure.add_subplot()
     draw(ax)
     if legend := ax.get_legend():
         legend.remove()
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small")
+        figure.legend(
+            *ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small"
+        )
     with matplotlib.rc_context({"svg.hashsalt": name}):  # else its marks have random names
         for kind, metadata in _UNDATED.items():
             figure.savefig(folder / f"{name}.{kind}", format=kind, metadata=metadata)
             figure.set_layout_engine("none")  # has been laid out
 
 
-def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]) -> None:
+def save_texts(
+    names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]
+) -> None:
     """The files made from the templates NAME.j2; the templates may use further filters."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("kfcourse.lab"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )
-    own = {"mathml": _mathml, "tex": escape_tex, "html": jinja2.filters.do_forceescape, "thousands": by_thousands}
+    own = {
+        "mathml": _mathml,
+        "tex": escape_tex,
+        "html": jinja2.filters.do_forceescape,
+        "thousands": by_thousands,
+    }
     environment.filters |= own | filters
     for name in names:
-        (folder / name).write_text(environment.get_template(name + ".j2").render(content), encoding="utf-8")
+        (folder / name).write_text(
+            environment.get_template(name + ".j2").render(content), encoding="utf-8"
+        )
 
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     """Write the numbers, for programs: lists over the steps, keyed by the filters' short names."""
 
-    def lists(estimate: Callable[[str], Estimate], part: str = "value", names: Sequence[str] = result.names) -> dict[str, Any]:
+    def lists(
+        estimate: Callable[[str], Estimate],
+        part: str = "value",
+        names: Sequence[str] = result.names,
+    ) -> dict[str, Any]:
         return {name: getattr(estimate(name), part).tolist() for name in names}
 
     ranking = [name for name, _ in result.ranking()]
@@ -171,7 +209,10 @@ def _number(estimate: Estimate) -> dict[str, float]:
 
 def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     if isinstance(model, JumpModel):
-        modes = {name: _model_in_numbers(mode) for name, mode in zip(model.names, model.modes, strict=True)}
+        modes = {
+            name: _model_in_numbers(mode)
+            for name, mode in zip(model.names, model.modes, strict=True)
+        }
         return {
             "modes": modes,
             "transition": [list(map(str, row)) for row in model.chain.tolist()],
@@ -189,7 +230,8 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
 def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence.
 
-    In per cent of the bound, the exact AOF's error variance; without it, of the control's.  Filters that diverge are left out.
+    In per cent of the bound, the exact AOF's error variance; without it, of the control's.  Filters
+    that diverge are left out.
     """
     ranked = [name for name, _ in result.ranking() if name not in result.lost]
     sentences = []
@@ -199,9 +241,12 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
         if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model
             sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
             continue
-        verdict = "is more accurate than" if low > ROUNDING else "is not significantly different from"
+        verdict = (
+            "is more accurate than" if low > ROUNDING else "is not significantly different from"
+        )
         sentences.append(
-            f"{title(better)} {verdict} {title(worse)}: {_three_digits(100 * float(difference.value))} % "
+            f"{title(better)} {verdict} {title(worse)}: "
+            f"{_three_digits(100 * float(difference.value))} % "
             f"({100 * confidence:g} % confidence: {_three_digits(low)} to {_three_digits(high)} %)."
         )
     return sentences
@@ -211,24 +256,36 @@ def _three_digits(value: float) -> str:
     """Three digits, or all before the point; a power of ten only for what is beyond all measure."""
     if abs(value) >= 1e12:
         return f"{value:.3g}"
-    return f"{value:.0f}" if abs(value) >= 1000 else np.format_float_positional(value, 3, fractional=False, trim="-")
+    return (
+        f"{value:.0f}"
+        if abs(value) >= 1000
+        else np.format_float_positional(value, 3, fractional=False, trim="-")
+    )
 
 
 def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> Recognised | None:
-    """What those of the filters compared that carry probabilities of modes know of them; None of a model without modes.
+    """What those of the filters compared that carry probabilities of modes know of them; None of a
+    model without modes.
 
     The exact filter tells only if it came through as many trajectories in its time.
     """
     model = result.model
     if not isinstance(model, JumpModel):
         return None
-    compared = [built for built in filters if isinstance(built, Filter) and built.name in result.names]
+    compared = [
+        built for built in filters if isinstance(built, Filter) and built.name in result.names
+    ]
     of_modes = [built for built in compared if JUMP_FILTERS[built.name].modes]
-    return recognised(of_modes, model, min(result.runs, RECOGNISED), result.steps, result.seed) if of_modes else None
+    return (
+        recognised(of_modes, model, min(result.runs, RECOGNISED), result.steps, result.seed)
+        if of_modes
+        else None
+    )
 
 
 def _mathml(line: str) -> str:
-    """One line of an aligned block as MathML, which browsers show without any script; columns of its matrices stay apart."""
+    """One line of an aligned block as MathML, which browsers show without any script; columns of
+    its matrices stay apart."""
     return mathml(ALIGNMENT.sub(lambda match: match["inner"] or "", line))
 
 

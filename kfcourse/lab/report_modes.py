@@ -1,4 +1,5 @@
-"""The student's report of a model with modes: what they differ in, their chain, functions of each, the logic-dynamic filter."""
+"""The student's report of a model with modes: what they differ in, their chain, functions of each,
+the logic-dynamic filter."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ class JumpReport(StudentReport):
 
     def __init__(self, result: Comparison, words: dict[str, str], modes: Recognised | None) -> None:
         super().__init__(result, words)
-        assert isinstance(result.model, JumpModel)  # `write_report` takes the other report for those without
+        # `write_report` takes the other report for those without
+        assert isinstance(result.model, JumpModel)
         self.model = result.model
         self.modes = modes
         self.structures = JumpStructures(self.model)
@@ -41,7 +43,10 @@ class JumpReport(StudentReport):
     @property
     def numbered(self) -> list[tuple[int, str, Model]]:
         """Number from 1, name and model of each mode."""
-        return [(j, *each) for j, each in enumerate(zip(self.model.names, self.model.modes, strict=True), 1)]
+        return [
+            (j, *each)
+            for j, each in enumerate(zip(self.model.names, self.model.modes, strict=True), 1)
+        ]
 
     def task(self) -> Iterator[Block]:
         model, words = self.model, self.words
@@ -58,11 +63,17 @@ class JumpReport(StudentReport):
         values = {name: [mode.values.get(name) for mode in model.modes] for name in names}
         common = [name for name, each in values.items() if len(set(each)) == 1]
         if common:
-            listed = ", ".join(f"${sp.latex(name)} = {number_latex(float(model.modes[0].values[name]))}$" for name in common)
+            listed = ", ".join(
+                f"${sp.latex(name)} = {number_latex(float(model.modes[0].values[name]))}$"
+                for name in common
+            )
             yield self.text("common_parameters", values=listed)
         own = [name for name in names if name not in common]
         heading = ["$j$", words["mode"], *(f"${sp.latex(name)}$" for name in own)]
-        rows = [[f"${j}$", name, *(_number(mode, key) for key in own)] for j, name, mode in self.numbered]
+        rows = [
+            [f"${j}$", name, *(_number(mode, key) for key in own)]
+            for j, name, mode in self.numbered
+        ]
         yield Block("table", words["modes_table"], heading, rows)
         yield self.text("laws")
         lines = [rf"x_0 &\sim {law(model.prior)}"]
@@ -73,11 +84,16 @@ class JumpReport(StudentReport):
             each = [law(of) for of in laws]
             same = all(text == each[0] for text in each)
             lines += (
-                [rf"{symbol} &\sim {each[0]}"] if same else [rf"{symbol}^{{{j}}} &\sim {text}" for j, text in enumerate(each, 1)]
+                [rf"{symbol} &\sim {each[0]}"]
+                if same
+                else [rf"{symbol}^{{{j}}} &\sim {text}" for j, text in enumerate(each, 1)]
             )
         yield formulas(lines)
         yield self.text("chain")
-        chain = rf"\pi &= \left(\mathsf{{P}}(i_{{k+1}} = j \mid i_k = i)\right)_{{ij}} = {sp.latex(model.chain)}"
+        chain = (
+            rf"\pi &= \left(\mathsf{{P}}(i_{{k+1}} = j \mid i_k = i)\right)_{{ij}} = "
+            rf"{sp.latex(model.chain)}"
+        )
         yield formulas([chain, rf"q &= {matrix(model.first[None])}"])
         yield self.text("independent")
         yield self.text("find_modes", filters=", ".join(map(self.title, self.result.entrants)))
@@ -111,7 +127,10 @@ class JumpReport(StudentReport):
         mean, cov = self.model.prior
         yield self.section("filters")
         yield self.text("start_modes")
-        start = [rf"\lambda_0^j &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0^j = D_0 = {matrix(cov)},\qquad c_0^j = q_j"]
+        start = [
+            rf"\lambda_0^j &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0^j = D_0 = "
+            rf"{matrix(cov)},\qquad c_0^j = q_j"
+        ]
         yield formulas(start)
         yield Block("subsection", words["logic_dynamic"])
         for key, equations in (
@@ -122,14 +141,21 @@ class JumpReport(StudentReport):
             yield self.text(key)
             yield formulas(lines_of(equations_latex(equations)))
         of_memory = dict.fromkeys(MEMORIES, "about_memory")
-        about = {"imm": "about_imm", "gpb2": "about_gpb2", **of_memory, "averaged": "about_averaged"}
+        about = {
+            "imm": "about_imm",
+            "gpb2": "about_gpb2",
+            **of_memory,
+            "averaged": "about_averaged",
+        }
         titles: dict[str, list[str]] = {}
         for name in self.result.entrants:
             entry = self.entries[name]
             averaged = entry.functions == "averaged" or entry.family == "duof"
             titles.setdefault("averaged" if averaged else entry.family, []).append(self.title(name))
         lines = [
-            self.said(text, names=", ".join(titles[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
+            self.said(
+                text, names=", ".join(titles[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$"
+            )
             for key, text in about.items()
             if key in titles
         ]
@@ -143,7 +169,12 @@ class JumpReport(StudentReport):
             return
         rows = [[self.title(name), in_percent(share)] for name, share in self.modes.share.items()]
         guess = [self.words["guess"], f"${100 * self.modes.guess:.1f}$"]
-        yield Block("table", self.words["share_table"], [self.words["filter"], self.words["share"]], [*rows, guess])
+        yield Block(
+            "table",
+            self.words["share_table"],
+            [self.words["filter"], self.words["share"]],
+            [*rows, guess],
+        )
         yield Block("figure", self.words["figure_modes"], ["modes"])
 
 

@@ -1,4 +1,5 @@
-"""The student's report of a model without modes: task, both derivations of the structural functions, equations of the filters."""
+"""The student's report of a model without modes: task, both derivations of the structural
+functions, equations of the filters."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ from kfcourse.symbolic.writing import formula_latex, number_latex
 
 HIGHEST = 8  # moment that is printed
 
-# Numbers in the school's catalogue of structural functions, for the forms whose numbers the course gives.
+# Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
+# gives.
 CATALOGUE = {
     ("tau", "c*z"): 2,
     ("Theta", "c**2*p + e**2*z**2"): 15,
@@ -40,10 +42,12 @@ class PlainReport(StudentReport):
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         super().__init__(result, words)
-        assert isinstance(result.model, Model)  # `write_report` takes the other report for those with modes
+        # `write_report` takes the other report for those with modes
+        assert isinstance(result.model, Model)
         self.model = result.model
         self.structures = Structures(self.model)
-        self.derivable: list[str] = []  # kinds whose formulas are found in time, and are not too long
+        # kinds whose formulas are found in time, and are not too long
+        self.derivable: list[str] = []
 
     def task(self) -> Iterator[Block]:
         model = self.model
@@ -57,13 +61,18 @@ class PlainReport(StudentReport):
             state = state.replace("&=", f"&= a(x_k, v_k{k}) =", 1)
             others = [meter.replace("&=", f"&= b(x_k, w_k{k}) =", 1), *others]
         yield formulas([state, *others])
-        values = ", ".join(f"${sp.latex(name)} = {number_latex(float(value))}$" for name, value in model.values.items())
+        values = ", ".join(
+            f"${sp.latex(name)} = {number_latex(float(value))}$"
+            for name, value in model.values.items()
+        )
         if values:
             yield self.text("parameters", values=values)
         laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
         yield formulas([rf"{name} &\sim {law(of)}" for name, of in laws])
         yield self.text("independent")
-        yield self.text("find", filters=", ".join(self.title(name) for name in self.result.entrants))
+        yield self.text(
+            "find", filters=", ".join(self.title(name) for name in self.result.entrants)
+        )
 
     def functions(self) -> Iterator[Block]:
         if self.kinds:
@@ -77,11 +86,18 @@ class PlainReport(StudentReport):
     def linearised(self) -> Iterator[Block]:
         """The derivatives of a scalar model."""
         model = self.model
-        sides = ((model.state_equation[0], model.v, "a", "v"), (model.meter_equation[0], model.w, "b", "w"))
+        sides = (
+            (model.state_equation[0], model.v, "a", "v"),
+            (model.meter_equation[0], model.w, "b", "w"),
+        )
         derivatives = [
-            rf"\frac{{\partial {letter}}}{{\partial {by}}} &= {formula_latex(formula.diff(symbol), model.x, noises)}"
+            rf"\frac{{\partial {letter}}}{{\partial {by}}} &= "
+            rf"{formula_latex(formula.diff(symbol), model.x, noises)}"
             for formula, noises, letter, noise in sides
-            for by, symbol in [("x", model.x[0]), *([(noise, noises[0])] if len(noises) == 1 else [])]
+            for by, symbol in [
+                ("x", model.x[0]),
+                *([(noise, noises[0])] if len(noises) == 1 else []),
+            ]
         ]
         yield self.text("derivatives")
         yield formulas(derivatives)
@@ -93,7 +109,9 @@ class PlainReport(StudentReport):
             yield formulas(conditional)
         if moments := self.moments():
             yield self.text("recursion")
-            yield formulas([r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
+            yield formulas(
+                [r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments]
+            )
         elif not self.structures.quadrature:
             yield self.text("exponentials")
 
@@ -104,12 +122,15 @@ class PlainReport(StudentReport):
             (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
             (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
         ):
-            over = GaussianMoments(list(noises), list(exact_matrix(noise.mean)), sp.Matrix(exact_matrix(noise.cov)))
+            over = GaussianMoments(
+                list(noises), list(exact_matrix(noise.mean)), sp.Matrix(exact_matrix(noise.cov))
+            )
             for letter, power in ((first, 1), (second, 2)):
                 try:
                     mean = sp.expand(over.mean_of(formula**power))
                 except NoClosedForm:
-                    continue  # the mean over noise and state together has a closed form, this one has none
+                    # the mean over noise and state together has a closed form, this one has none
+                    continue
                 lines.append(f"{letter}(x) &= {formula_latex(mean, model.x)}")
         return lines
 
@@ -122,7 +143,10 @@ class PlainReport(StudentReport):
         m, d = sp.symbols("m d", real=True)
         law = GaussianMoments([x], [m], sp.Matrix([[d]]))
         highest = min(max(int(sp.degree(sp.expand(side), x)) for side in sides), HIGHEST)
-        return [f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}" for n in range(2, highest + 1)]
+        return [
+            f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}"
+            for n in range(2, highest + 1)
+        ]
 
     def derived(self, kind: str) -> Iterator[Block]:
         """The five functions, with their numbers in the catalogue where it has them."""
@@ -138,7 +162,11 @@ class PlainReport(StudentReport):
         if self.model.n == self.model.p == 1:
             structure = getattr(self.structures, kind)
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
-            numbers = [f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
+            numbers = [
+                f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}"
+                for name, form in forms.items()
+                if form in CATALOGUE
+            ]
             if numbers:
                 yield self.text("catalogue", numbers=", ".join(numbers))
 
@@ -147,19 +175,31 @@ class PlainReport(StudentReport):
         yield self.section("filters")
         yield self.text("start")
         mean, cov = self.model.prior
-        yield formulas([rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
+        yield formulas(
+            [rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"]
+        )
         families = dict.fromkeys(entry(name).family for name in self.result.entrants)
         designed = next((family for family in families if family != "aof"), "")
         for family in filter(EQUATIONS.get, families):
-            heading = FAMILIES[family].russian_heading if words["language"] == "ru" else FAMILIES[family].heading
+            heading = (
+                FAMILIES[family].russian_heading
+                if words["language"] == "ru"
+                else FAMILIES[family].heading
+            )
             yield Block("subsection", heading)
             if family == "duof":
                 yield self.text("criteria")
                 yield formulas(words["criteria_formulas"].split("\n"))
             yield formulas(lines_of(equations_latex(EQUATIONS[family])))
             if family == "aof" and self.model.n == self.model.p == 1:
-                for name in (f"aof-{kind}" for kind in self.derivable if f"aof-{kind}" in self.result.entrants):
+                for name in (
+                    f"aof-{kind}"
+                    for kind in self.derivable
+                    if f"aof-{kind}" in self.result.entrants
+                ):
                     yield self.text("written_out", name=self.title(name))
-                    yield formulas(written_lines(getattr(self.structures, name.removeprefix("aof-"))))
+                    yield formulas(
+                        written_lines(getattr(self.structures, name.removeprefix("aof-")))
+                    )
             if family == designed:
                 yield self.text("over_ensemble")

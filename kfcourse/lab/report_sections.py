@@ -1,4 +1,5 @@
-"""What all reports have: pieces, the comparison, the conclusion (`report_plain`, `report_modes`: what comes before)."""
+"""What all reports have: pieces, the comparison, the conclusion (`report_plain`, `report_modes`:
+what comes before)."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
 @dataclass(frozen=True)
 class Block:
-    """A piece of the report, of a kind: section, subsection, text, items, formulas, table or figure."""
+    """A piece of the report, of a kind: section, subsection, text, items, formulas, table or
+    figure."""
 
     kind: str
     text: str = ""
@@ -35,14 +37,19 @@ def formulas(lines: list[str]) -> Block:
 
 
 class StudentReport:
-    """The blocks of the report, section by section; a subclass has the task, the functions and the filters."""
+    """The blocks of the report, section by section; a subclass has the task, the functions and the
+    filters."""
 
     entries: Mapping[str, Entry] = FILTERS  # where filters have their names from
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
         self.known: Sequence[Admission] = ()
-        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.names)]
+        self.kinds = [
+            kind
+            for kind in ("linearised", "gaussian")
+            if any(name.endswith(kind) for name in result.names)
+        ]
         compared = result.has_bound or len(result.entrants) > 1
         self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
 
@@ -54,7 +61,11 @@ class StudentReport:
 
     def said(self, key: str, **values: object) -> str:
         """The words of that name, filled with what they speak of."""
-        return filled(self.words[key], self.words["thousands"], **values) if values else self.words[key]
+        return (
+            filled(self.words[key], self.words["thousands"], **values)
+            if values
+            else self.words[key]
+        )
 
     def section(self, key: str) -> Block:
         return Block("section", self.words[key])
@@ -75,9 +86,18 @@ class StudentReport:
         yield from self.conclusion()
         if self.known:
             yield self.section("admitted")
-            heading = [self.words["filter"], self.words["admitted_verdict"], self.words["admitted_why"]]
+            heading = [
+                self.words["filter"],
+                self.words["admitted_verdict"],
+                self.words["admitted_why"],
+            ]
             rows = [
-                [self.title(answer.name), self.words[f"admitted_{answer.verdict}"], self.why(answer)] for answer in self.known
+                [
+                    self.title(answer.name),
+                    self.words[f"admitted_{answer.verdict}"],
+                    self.why(answer),
+                ]
+                for answer in self.known
             ]
             yield Block("table", self.words["admitted_text"], heading, rows)
 
@@ -106,9 +126,15 @@ class StudentReport:
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
         yield self.section("experiment")
-        sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
+        sentences = [
+            self.said(
+                "experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed)
+            )
+        ]
         if result.designed:
-            sentences.append(self.said("designs", filters=", ".join(map(self.title, result.designed))))
+            sentences.append(
+                self.said("designs", filters=", ".join(map(self.title, result.designed)))
+            )
         if result.has_bound:
             sentences.append(words["exact"])
         yield Block("text", " ".join(sentences))
@@ -118,17 +144,38 @@ class StudentReport:
         for start in range(0, len(result.names), COLUMNS):
             names = result.names[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
-            rows = [[f"${k}$", *(power_of_ten(estimate[k]) for estimate in estimates)] for k in table_steps(result)]
-            yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
+            rows = [
+                [f"${k}$", *(power_of_ten(estimate[k]) for estimate in estimates)]
+                for k in table_steps(result)
+            ]
+            yield Block(
+                "table",
+                words["table_goes_on" if start else "table"],
+                ["$k$", *map(self.title, names)],
+                rows,
+            )
         for text in self.remarks():
             yield Block("text", text)
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
-            yield Block("figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [name])
+            yield Block(
+                "figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [name]
+            )
         if "ranking" in self.figures:
-            gaps = [words["diverges"] if name in result.lost else in_percent(gap) for name, gap in result.ranking()]
-            rows = [[self.title(name), gap] for (name, _), gap in zip(result.ranking(), gaps, strict=True)]
-            yield Block("table", self.said("ranking_table", reference=reference), [words["filter"], "%"], rows)
+            gaps = [
+                words["diverges"] if name in result.lost else in_percent(gap)
+                for name, gap in result.ranking()
+            ]
+            rows = [
+                [self.title(name), gap]
+                for (name, _), gap in zip(result.ranking(), gaps, strict=True)
+            ]
+            yield Block(
+                "table",
+                self.said("ranking_table", reference=reference),
+                [words["filter"], "%"],
+                rows,
+            )
 
     def remarks(self) -> Iterator[str]:
         """What a reader must know before he relies on distances from the bound."""
@@ -138,39 +185,54 @@ class StudentReport:
             steps["diverged"] = np.any([*result.lost.values()], axis=0)
         for kind, mask in steps.items():
             if mask.any():
-                whose, at = ", ".join(map(self.title, result.lost)), self.at(np.flatnonzero(mask).tolist())
+                whose, at = (
+                    ", ".join(map(self.title, result.lost)),
+                    self.at(np.flatnonzero(mask).tolist()),
+                )
                 yield self.said(f"remark_{kind}", names=whose, at=at)
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
         names: dict[str, list[str]] = {}
         for name, reason in self.result.left_out.items():
-            names.setdefault(cause(reason, self.result.model, self.words), []).append(self.title(name))
+            names.setdefault(cause(reason, self.result.model, self.words), []).append(
+                self.title(name)
+            )
         yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
 
     def conclusion(self) -> Iterator[Block]:
         result, words = self.result, self.words
         if len(result.entrants) == 1:
             yield self.section("conclusion")
-            yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
+            yield Block(
+                "text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control")
+            )
             return
         verdicts = result.verdicts()
         yield self.section("conclusion")
         yield self.text("verdict_text", level=LEVEL)
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
-            [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
+            [
+                f"${k}$",
+                self.title(best),
+                ", ".join(map(self.title, others)) or "–",
+                self.title(worst) if worst else "–",
+            ]
             for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
         ]
         yield Block("table", words["verdict_table"], heading, rows)
         yield Block("items", lines=list(self.sentences(verdicts)))
 
     def sentences(self, verdicts: list[Verdict]) -> Iterator[str]:
-        """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
+        """The conclusion: who leads and who is last, on how many steps, and how far from the
+        bound."""
         result, words = self.result, self.words
         alone = [best for best, others, _ in verdicts if not others]
         for name in sorted(set(alone), key=lambda name: -alone.count(name)):
-            steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
+            steps = [
+                k for k, (best, others, _) in enumerate(verdicts) if best == name and not others
+            ]
             yield self.said("leads", name=self.title(name), at=self.at(steps))
         if not alone:
             yield words["nobody_leads"]
@@ -183,8 +245,11 @@ class StudentReport:
             yield self.said("last", name=self.title(name), steps=last.count(name), all=result.steps)
         else:
             yield words["nobody_last"]
-        leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING  # the control, or its equal
-        yield self.mean_sentence("mean_first" if leads else "mean_bound" if result.has_bound else "mean_control")
+        # the control, or its equal
+        leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING
+        yield self.mean_sentence(
+            "mean_first" if leads else "mean_bound" if result.has_bound else "mean_control"
+        )
 
     def at(self, steps: list[int]) -> str:
         """At step 2; at steps 0–1, 3–50."""
@@ -193,7 +258,9 @@ class StudentReport:
     def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
         result = self.result
-        ranked = [place for place in result.ranking() if place[0] not in result.lost] or result.ranking()
+        ranked = [
+            place for place in result.ranking() if place[0] not in result.lost
+        ] or result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
         if len(ranked) == 1 and len(result.entrants) > 1:
             return self.said("mean_alone", first=self.title(first))
@@ -214,5 +281,9 @@ class StudentReport:
 
 def table_steps(result: Comparison) -> list[int]:
     """The first steps and then some, to the last."""
-    steps = [k for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000) if k < result.steps]
+    steps = [
+        k
+        for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000)
+        if k < result.steps
+    ]
     return steps if steps[-1] == result.steps - 1 else [*steps, result.steps - 1]

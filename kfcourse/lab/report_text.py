@@ -1,4 +1,5 @@
-"""Pieces of reports: laws, numbers and steps in LaTeX; text with $formulas$ for HTML and for LaTeX."""
+"""Pieces of reports: laws, numbers and steps in LaTeX; text with $formulas$ for HTML and for
+LaTeX."""
 
 from __future__ import annotations
 
@@ -23,9 +24,11 @@ LONGEST = 40_000  # characters of LaTeX: some ten pages
 
 
 def filled(text: str, thousands: str, **values: object) -> str:
-    """The text with {name} replaced by what the name stands for; braces of LaTeX stay, `thousands` parts long numbers.
+    """The text with {name} replaced by what the name stands for; braces of LaTeX stay, `thousands`
+    parts long numbers.
 
-    {name:step/steps} puts a number and the word that goes with it, in Russian one of three: {name:шаг/шага/шагов}.
+    {name:step/steps} puts a number and the word that goes with it, in Russian one of three:
+    {name:шаг/шага/шагов}.
     """
 
     def replacement(match: re.Match[str]) -> str:
@@ -40,7 +43,8 @@ def filled(text: str, thousands: str, **values: object) -> str:
 
 
 def with_number(number: int, words: list[str]) -> str:
-    """The word that goes with a number: of one and many, or in Russian of 1, 2 and 5, as 21, 22 and 25 have them too."""
+    """The word that goes with a number: of one and many, or in Russian of 1, 2 and 5, as 21, 22 and
+    25 have them too."""
     if len(words) == 2:
         return words[number != 1]
     ends, teens = number % 10, number % 100 in range(11, 15)
@@ -54,7 +58,8 @@ def lines_of(block: str) -> list[str]:
 
 
 def printed(structures: Structures, kind: str) -> list[str] | None:
-    """The lines of the structural functions of a kind; None if they are not found in time, or too long to print.
+    """The lines of the structural functions of a kind; None if they are not found in time, or too
+    long to print.
 
     Raises
     ------
@@ -101,18 +106,23 @@ def inline_html(text: str) -> str:
     """Text for HTML: special characters escaped, $formulas$ as MathML."""
     pieces = re.split(r"\$([^$]+)\$", text)
     return "".join(
-        mathml(piece, "inline") if i % 2 else str(jinja2.filters.do_forceescape(piece)) for i, piece in enumerate(pieces)
+        mathml(piece, "inline") if i % 2 else str(jinja2.filters.do_forceescape(piece))
+        for i, piece in enumerate(pieces)
     )
 
 
 def inline_tex(text: str) -> str:
     """Text for LaTeX: special characters escaped outside of $formulas$."""
     pieces = re.split(r"(\$[^$]+\$)", text)
-    return "".join(piece if i % 2 else _typeset(escape_tex(piece)) for i, piece in enumerate(pieces))
+    return "".join(
+        piece if i % 2 else _typeset(escape_tex(piece)) for i, piece in enumerate(pieces)
+    )
 
 
 def _typeset(text: str) -> str:
-    return text.replace("–", "--").replace("—", "---").replace("\u202f", r"\,").replace("\u00a0", "~")
+    return (
+        text.replace("–", "--").replace("—", "---").replace("\u202f", r"\,").replace("\u00a0", "~")
+    )
 
 
 def ranges(steps: Sequence[int], form: str = "{}") -> str:
@@ -123,20 +133,26 @@ def ranges(steps: Sequence[int], form: str = "{}") -> str:
             parts[-1][1] = k
         else:
             parts.append([k, k])
-    return ", ".join(form.format(a) if a == b else f"{form.format(a)}–{form.format(b)}" for a, b in parts)
+    return ", ".join(
+        form.format(a) if a == b else f"{form.format(a)}–{form.format(b)}" for a, b in parts
+    )
 
 
 def percent(part: Estimate) -> str:
-    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"; "–" where there is none."""
+    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"; "–"
+    where there is none."""
     if np.isnan(part.value):
         return "–"
     value, error = 100 * float(part.value), 100 * float(part.standard_error)
-    places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
+    places = (
+        int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
+    )
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
 def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
-    """Value and standard error over the power of ten of the value, and that power; None for zero and what is not finite."""
+    """Value and standard error over the power of ten of the value, and that power; None for zero
+    and what is not finite."""
     value, error = float(estimate.value), float(estimate.standard_error)
     if not (np.isfinite(value) and value):
         return value, error, None
@@ -146,13 +162,23 @@ def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
 
 def escape_tex(text: str) -> str:
     """Plain text for LaTeX."""
-    special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "±": r"$\pm$", "·": r"$\cdot$"}
+    special = {
+        "\\": r"\textbackslash{}",
+        "^": r"\textasciicircum{}",
+        "~": r"\textasciitilde{}",
+        "±": r"$\pm$",
+        "·": r"$\cdot$",
+    }
     return re.sub(r"[#$%&_{}\\^~±·]", lambda match: special.get(match[0], "\\" + match[0]), text)
 
 
 def cause(reason: Reason, model: Model | JumpModel, words: Mapping[str, str]) -> str:
-    """The sentence for an error of a kind, `left_KIND` of the report's words; other messages are quoted."""
+    """The sentence for an error of a kind, `left_KIND` of the report's words; other messages are
+    quoted."""
     if not (isinstance(reason, Refused | NotFinite) and reason.kind):
         return words["left_other"].format(reason=reason)
-    parts = {name: formula_latex(part, model.x) if name == "term" else part for name, part in reason.parts.items()}
+    parts = {
+        name: formula_latex(part, model.x) if name == "term" else part
+        for name, part in reason.parts.items()
+    }
     return words[f"left_{reason.kind}"].format(**parts)

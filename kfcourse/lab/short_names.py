@@ -1,4 +1,5 @@
-"""The lab's filters by short name: how each is built, and what it is called in tables and figures."""
+"""The lab's filters by short name: how each is built, and what it is called in tables and
+figures."""
 
 from __future__ import annotations
 
@@ -62,7 +63,8 @@ class _OfModes(Generic[AnyModel]):
 
     @cached_property
     def quadrature(self) -> Checked | NoClosedForm | None:
-        """What takes the place of the Gaussian functions if they have no closed form, or why nothing does; None if they have."""
+        """What takes the place of the Gaussian functions if they have no closed form, or why
+        nothing does; None if they have."""
         try:
             _ = self._gaussian
         except NoClosedForm as why:
@@ -77,7 +79,8 @@ class _OfModes(Generic[AnyModel]):
 
 
 class Structures(_OfModes[Model]):
-    """The structural functions of a model.  `normal`: Gaussian, by quadrature if they have no closed form, else NoClosedForm."""
+    """The structural functions of a model.  `normal`: Gaussian, by quadrature if they have no
+    closed form, else NoClosedForm."""
 
     linearised = property(lambda self: self._linearised[0])
     gaussian = property(lambda self: self._gaussian[0])
@@ -102,7 +105,8 @@ class JumpStructures(_OfModes[JumpModel]):
 
 
 def _by_quadrature(model: Model | JumpModel, why: NoClosedForm) -> Checked | NoClosedForm:
-    """As `quadrature`; kept of the models asked for last, as a pilot takes seconds, and a report asks again."""
+    """As `quadrature`; kept of the models asked for last, as a pilot takes seconds, and a report
+    asks again."""
     for asked, kept in _ASKED:
         if asked is model:
             return kept
@@ -119,15 +123,18 @@ _ASKED: deque[tuple[Model | JumpModel, Checked | NoClosedForm]] = deque(maxlen=4
 
 
 class Entry(NamedTuple):
-    """A filter of the lab, or of those for models that jump: printed names, how to build it, and what it is.
+    """A filter of the lab, or of those for models that jump: printed names, how to build it, and
+    what it is.
 
     functions : str
-        Of which structural functions: "gaussian", "linearised", "unscented", "gauss-hermite", "averaged" (over the modes), "best"
-        (Gaussian if they can be had, else linearised); "exact"; "" of none.
+        Of which structural functions: "gaussian", "linearised", "unscented", "gauss-hermite",
+        "averaged" (over the modes), "best" (Gaussian if they can be had, else linearised); "exact";
+        "" of none.
     family, drawn : str
         Keys of `FAMILIES`: of its equations, and of its colour and marker.
     memory, modes : bool
-        Whether it remembers several steps, and whether its state has the probabilities of the modes.
+        Whether it remembers several steps, and whether its state has the probabilities of the
+        modes.
     """
 
     title: str
@@ -149,9 +156,11 @@ def _twice(
     memory: bool = False,
     modes: bool = False,
 ) -> dict[str, Entry]:
-    """The entries of "fos", or with a `number` of "fos3": with Gaussian structural functions and with linearised ones.
+    """The entries of "fos", or with a `number` of "fos3": with Gaussian structural functions and
+    with linearised ones.
 
-    `russian` ends the Russian name.  Those that `jump` are built of the model and the functions of each mode: the LD-GFOS.
+    `russian` ends the Russian name.  Those that `jump` are built of the model and the functions of
+    each mode: the LD-GFOS.
     """
     of = FAMILIES[family]
     drawn = family + number if family + number in FAMILIES else family
@@ -167,12 +176,16 @@ def _twice(
     }  # fmt: skip
 
 
-def _built(build: Callable[..., Filter | Design], functions: str, structures: Structures | JumpStructures) -> Filter | Design:
+def _built(
+    build: Callable[..., Filter | Design], functions: str, structures: Structures | JumpStructures
+) -> Filter | Design:
     of = structures.normal if functions == "gaussian" else structures.linearised
     return build(of) if isinstance(structures, Structures) else build(structures.model, of)
 
 
-def _alone(family: str, build: Callable[[Any], Filter | Design], functions: str = "", modes: bool = False) -> dict[str, Entry]:
+def _alone(
+    family: str, build: Callable[[Any], Filter | Design], functions: str = "", modes: bool = False
+) -> dict[str, Entry]:
     """The entry of a family that is a single filter."""
     of = FAMILIES[family]
     return {family: Entry(of.title, of.russian, build, functions, family, family, modes=modes)}
@@ -195,24 +208,58 @@ FILTERS: dict[str, Entry] = {
     **_twice("dfkp", dfkp, *_MEMORY, memory=True),
     **_twice("mdfkp", mdfkp, *_MEMORY, memory=True),
     **_twice("fbp", fbp, *_MEMORY, memory=True),
-    "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented", "aof", "aof"),
-    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model)), "gauss-hermite", "aof", "aof"),
+    "aof-unscented": Entry(
+        "UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented", "aof", "aof"
+    ),
+    "aof-gauss-hermite": Entry(
+        "GHKF",
+        "АОФ, Гаусс–Эрмит",
+        lambda s: aof(gauss_hermite(s.model)),
+        "gauss-hermite",
+        "aof",
+        "aof",
+    ),
     "aof-exact": _EXACT,
     **_alone("particle", lambda s: particle(s.model)),
 }
-# The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
+# The same for models that jump: filters that know the modes, and plain ones on the average over the
+# modes.
 JUMP_FILTERS: dict[str, Entry] = {
-    **_twice("aof", lambda model, structures: logic_dynamic(structures, model, model.first), jump=True, modes=True),
+    **_twice(
+        "aof",
+        lambda model, structures: logic_dynamic(structures, model, model.first),
+        jump=True,
+        modes=True,
+    ),
     **_alone("imm", lambda s: imm(s.best, s.model, s.model.first), "best", modes=True),
     **_alone("gpb2", lambda s: gpb2(s.best, s.model, s.model.first), "best", modes=True),
     **_twice("fos", logic_dynamic_fos, jump=True),
     **_twice("fkp", logic_dynamic_fkp, *_MEMORY, jump=True, memory=True),
     **_twice("fbp", logic_dynamic_fbp, *_MEMORY, jump=True, memory=True),
-    "aof-averaged": Entry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged), "averaged", "aof", "aof"),
+    "aof-averaged": Entry(
+        "AOF (averaged)",
+        "АОФ (среднее по режимам)",
+        lambda s: aof(s.averaged),
+        "averaged",
+        "aof",
+        "aof",
+    ),
     **_alone("duof", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
-    "fos-averaged": Entry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged), "averaged", "fos", "fos"),
+    "fos-averaged": Entry(
+        "FOS (averaged)",
+        "ФОС (среднее по режимам)",
+        lambda s: fos(s.averaged),
+        "averaged",
+        "fos",
+        "fos",
+    ),
     "mfos-averaged": Entry(
-        "MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged), "averaged", "mfos", "mfos"
+        "MFOS (averaged)",
+        "МФОС (среднее по режимам)",
+        lambda s: mfos(s.averaged),
+        "averaged",
+        "mfos",
+        "mfos",
     ),
     "aof-exact": _EXACT,
 }
@@ -220,12 +267,23 @@ JUMP_FILTERS: dict[str, Entry] = {
 TITLES = {"iterated-linearised": FAMILIES["iterated"].title, "iterated-unscented": "iterated UKF"}
 BOUND = 1000  # particles of the exact AOF where there are no point masses
 # As of models without jumps, those that remember several steps are asked for by name.
-JUMP_LAB = tuple(name for name, known in JUMP_FILTERS.items() if name != "aof-exact" and not known.memory)
-LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
+JUMP_LAB = tuple(
+    name for name, known in JUMP_FILTERS.items() if name != "aof-exact" and not known.memory
+)
+LAB = (
+    "aof-gaussian",
+    "aof-linearised",
+    "duof",
+    "fos-gaussian",
+    "fos-linearised",
+    "mfos-gaussian",
+    "mfos-linearised",
+)
 
 
 def entry(name: str) -> Entry:
-    """What is known of a filter; of those that are not the lab's by what their names are made of, FAMILY[LENGTH]-FUNCTIONS."""
+    """What is known of a filter; of those that are not the lab's by what their names are made of,
+    FAMILY[LENGTH]-FUNCTIONS."""
     if known := FILTERS.get(name) or JUMP_FILTERS.get(name):
         return known
     kind, _, functions = name.partition("-")
@@ -235,7 +293,14 @@ def entry(name: str) -> Entry:
         return known._replace(title=known.title.replace(str(STEPS), kind.removeprefix(family)))
     drawn = next((key for key in (name, kind, family) if key in FAMILIES), family)
     printed = FAMILIES[name].title if name in FAMILIES else TITLES.get(name, name)
-    return Entry(printed, printed, lambda _: check_names([name]), functions.removeprefix("jump-"), family, drawn)
+    return Entry(
+        printed,
+        printed,
+        lambda _: check_names([name]),
+        functions.removeprefix("jump-"),
+        family,
+        drawn,
+    )
 
 
 def title(name: str) -> str:
@@ -244,14 +309,16 @@ def title(name: str) -> str:
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
-    """Filters of the lab for a model, by short names; `kfcourse.lab.admission` says of each whether it can be had.
+    """Filters of the lab for a model, by short names; `kfcourse.lab.admission` says of each whether
+    it can be had.
 
     Raises
     ------
     ValueError
         An unknown name; the message lists the known ones.
     NoClosedForm, ModelError
-        A filter that this model does not admit; the message names the filter and says what to use instead.
+        A filter that this model does not admit; the message names the filter and says what to use
+        instead.
     """
     check_names(names)
     structures = Structures(model)
@@ -268,11 +335,14 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
     """ValueError, which lists the known names, if a short name is not among them."""
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
+        raise ValueError(
+            f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(known)}"
+        )
 
 
 def exact(model: Model | JumpModel) -> Filter:
-    """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
+    """The exact AOF, by point masses where they reach, else by particles, whose own error does not
+    enter the bound.
 
     Raises
     ------
@@ -282,12 +352,15 @@ def exact(model: Model | JumpModel) -> Filter:
     if has_exact(model):
         return pointmass(model)
     if not all(map(has_object_noise, modes_of(model))):
-        raise ModelError("no noise enters the object, and copies of a particle stay copies: there is no bound")
+        raise ModelError(
+            "no noise enters the object, and copies of a particle stay copies: there is no bound"
+        )
     return particle(model, BOUND, name="aof-exact")
 
 
 def has_exact(model: Model | JumpModel) -> bool:
-    """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering linearly."""
+    """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering
+    linearly."""
     try:
         pointmass(model)
     except ModelError:

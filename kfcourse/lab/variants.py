@@ -1,4 +1,5 @@
-"""The variants of the lab, read from TOML: variants.toml, tasks.toml, jumps.toml, or a file of one's own."""
+"""The variants of the lab, read from TOML: variants.toml, tasks.toml, jumps.toml, or a file of
+one's own."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from kfcourse.symbolic.sense import nothing_random
 SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
 TABLES = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes"}
 KEYS = {"title", "steps", "state", "meter", "interval", "angles", "transition", "first"} | TABLES
-IN_TIME = {"drift", "diffusion", "instants", "stratonovich", "substeps", "accuracy"}  # of an object in continuous time
+# of an object in continuous time
+IN_TIME = {"drift", "diffusion", "instants", "stratonovich", "substeps", "accuracy"}
 OF_STEPS = {"state", "state_noise", "modes", "transition", "first"}
 STEPS = 51  # of the lab, where a variant does not say another number
 RUNS = 40_000  # trajectories by which a variant is checked
@@ -52,7 +54,8 @@ class Variant:
         """The model; VariantError, which says what knows no modes, if it has some."""
         if isinstance(self.model, JumpModel):
             raise VariantError(
-                f"variant {self.name} jumps between modes ({', '.join(self.model.names)}), for which "
+                f"variant {self.name} jumps between modes ({', '.join(self.model.names)}), for "
+                f"which "
                 f"{what} are not made; `kfcourse lab {self.name}` compares filters on it "
                 "(with --variants FILE if it is one of your own)"
             )
@@ -67,8 +70,8 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally
         `title`, `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles`
-        (see `Model.define`); of an object in continuous time `drift` and `diffusion` in the place of
-        `state`, and `instants` (see `kfcourse.continuous.sampled`).
+        (see `Model.define`); of an object in continuous time `drift` and `diffusion` in the place
+        of `state`, and `instants` (see `kfcourse.continuous.sampled`).
         `steps` is how many measurements the lab takes.  Those with `modes`,
         `transition`, `first` (see `JumpModel.define`), and the shipped tasks of the school's
         program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
@@ -101,7 +104,9 @@ def usable_variants(
     variants, faults = read_variants(path, list(_shipped(SHIPPED[0])) if path is None else ())
     if not variants:
         raise next(iter(faults.values()))
-    return {name: variant for name, variant in variants.items() if isinstance(variant.model, Model)}, faults
+    return {
+        name: variant for name, variant in variants.items() if isinstance(variant.model, Model)
+    }, faults
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
@@ -109,8 +114,11 @@ def find_variant(name: str, path: str | Path | None = None) -> Variant:
     return chosen_variants([name], False, path)[0]
 
 
-def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | None = None) -> list[Variant]:
-    """The variants of these names, each once, or all of `load_variants`; VariantError for others."""
+def chosen_variants(
+    names: Sequence[str], everything: bool, path: str | Path | None = None
+) -> list[Variant]:
+    """The variants of these names, each once, or all of `load_variants`; VariantError for
+    others."""
     if everything:
         return list(load_variants(path).values())
     variants, faults = read_variants(path, names)
@@ -144,15 +152,25 @@ def read_tables(path: str | Path | None = None, names: Sequence[str] = ()) -> di
     VariantError
         The file is missing or not TOML, or has no variant of such a name.
     """
-    tables = {name: table for file in SHIPPED for name, table in _shipped(file).items()} if path is None else _tables(Path(path))
+    tables = (
+        {name: table for file in SHIPPED for name, table in _shipped(file).items()}
+        if path is None
+        else _tables(Path(path))
+    )
     if unknown := [name for name in names if name not in tables]:
-        known = ", ".join([*tables][:MANY]) + (f", ... ({len(tables)} in all)" if len(tables) > MANY else "")
+        known = ", ".join([*tables][:MANY]) + (
+            f", ... ({len(tables)} in all)" if len(tables) > MANY else ""
+        )
         raise VariantError(f"no variant {', '.join(map(repr, unknown))}; there are {known}")
     return {name: tables[name] for name in dict.fromkeys(names) or tables}
 
 
 def _shipped(file: str) -> dict[str, Any]:
-    return dict(tomllib.loads((resources.files("kfcourse.lab") / file).read_text(encoding="utf-8"))["variants"])
+    return dict(
+        tomllib.loads((resources.files("kfcourse.lab") / file).read_text(encoding="utf-8"))[
+            "variants"
+        ]
+    )
 
 
 def _tables(path: Path) -> dict[str, Any]:
@@ -165,35 +183,48 @@ def _tables(path: Path) -> dict[str, Any]:
         raise VariantError(f"{path} cannot be read: {error}") from None
     except (ValueError, RecursionError) as error:
         raise VariantError(
-            f"{path} is not valid TOML: {error}; formulas and other texts stand in quotes, and a number has a digit before "
+            f"{path} is not valid TOML: {error}; formulas and other texts stand in quotes, and a "
+            f"number has a digit before "
             "its point, as in 0.9"
         ) from None
     if not isinstance(tables, dict) or not tables:
-        raise VariantError(f'{path} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
+        raise VariantError(
+            f'{path} has no variants; it needs tables such as [variants.53] with state = "..." '
+            f'and meter = "..."'
+        )
     return tables
 
 
 def read_variant(name: str, table: Any, where: str) -> Variant:
     """A variant from its table; VariantError, naming the place, if it is not a model."""
     if not name.isprintable():  # it goes to terminals
-        raise VariantError(f"variant {name!r} in {where}: a name with characters that cannot be seen; type it anew")
+        raise VariantError(
+            f"variant {name!r} in {where}: a name with characters that cannot be seen; type it anew"
+        )
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
     moves = bool({"drift", "diffusion"} & set(table))
-    keys, needed = (KEYS - OF_STEPS | IN_TIME, {"drift", "diffusion"}) if moves else (KEYS, {"state"})
+    keys, needed = (
+        (KEYS - OF_STEPS | IN_TIME, {"drift", "diffusion"}) if moves else (KEYS, {"state"})
+    )
     unknown, missing = sorted(set(table) - keys), sorted(({"meter"} | needed) - set(table))
     if unknown or missing:
-        problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
+        problem = (
+            f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
+        )
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(keys))}")
     for key in sorted(TABLES & set(table)):
         if not isinstance(table[key], Mapping):
-            raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}")
+            raise VariantError(
+                f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}"
+            )
     try:
         model = sampled_of_table(table) if moves else model_of_table(table)
         steps = table.get("steps", STEPS)
         expect_sizes(steps=steps)
-    except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
+    # FormulaError and ModelError are ValueErrors
+    except (ValueError, TypeError, OverflowError) as error:
         raise VariantError(f"{prefix}{error}") from None
     for mode in model.modes if isinstance(model, JumpModel) else (model,):
         if problem := nothing_random(mode):
@@ -202,25 +233,38 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
 
 
 def on_a_line(text: str) -> str:
-    """A title or formula that goes to terminals: no line breaks, no characters that cannot be seen."""
+    """A title or formula that goes to terminals: no line breaks, no characters that cannot be
+    seen."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def summary(name: str, table: Mapping[str, Any]) -> str:
-    """Name, title and equations as the table has them; a line for each mode, of what differs there."""
+    """Name, title and equations as the table has them; a line for each mode, of what differs
+    there."""
     modes: Mapping[str, Mapping[str, Any]] = table.get("modes", {})
-    numbers = [{**table.get("parameters", {}), **mode.get("parameters", {})} for mode in modes.values()]
+    numbers = [
+        {**table.get("parameters", {}), **mode.get("parameters", {})} for mode in modes.values()
+    ]
     formulas = [_equations({**table, **mode}) for mode in modes.values()] or [_equations(table)]
     common = formulas[:1] if len(set(formulas)) == 1 else []
     lines = [f"{name:>6}  {on_a_line(str(table.get('title', ''))) or 'no title'}", *common]
     for mode, formula, values in zip(modes, formulas, numbers, strict=bool(modes)):
-        own = [f"{key} = {value:g}" for key, value in values.items() if any(of.get(key) != value for of in numbers)]
+        own = [
+            f"{key} = {value:g}"
+            for key, value in values.items()
+            if any(of.get(key) != value for of in numbers)
+        ]
         lines.append(f"{mode}: {';  '.join(own if common else [formula, *own])}")
     return "\n        ".join(lines)
 
 
 def _equations(table: Mapping[str, Any]) -> str:
     left, key = ("dx/dt", "drift") if "drift" in table else ("x'", "state")
-    state, meter = ([side] if isinstance(side, str) else side for side in (table[key], table["meter"]))
+    state, meter = (
+        [side] if isinstance(side, str) else side for side in (table[key], table["meter"])
+    )
     pushed = f" + ({on_a_line(str(table['diffusion']))}) v" if key == "drift" else ""
-    return f"{left} = {', '.join(map(on_a_line, state))}{pushed};  y = {', '.join(map(on_a_line, meter))}"
+    return (
+        f"{left} = {', '.join(map(on_a_line, state))}{pushed};  y = "
+        f"{', '.join(map(on_a_line, meter))}"
+    )

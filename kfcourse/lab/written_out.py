@@ -1,4 +1,5 @@
-"""The Gaussian and the linearised AOF of a scalar model, with its structural functions put into the filter's equations."""
+"""The Gaussian and the linearised AOF of a scalar model, with its structural functions put into the
+filter's equations."""
 
 from __future__ import annotations
 
@@ -15,17 +16,21 @@ SHORT = WIDTH // 3  # symbols of h and G that are put into K and z; longer ones 
 
 
 def scalar_equations(structure: Structure) -> list[tuple[sp.Symbol, sp.Expr]]:
-    """K_k, z_k, p_k, lambda_{k+1}, Psi_{k+1}, and before them F_k: name and formula, in the order of computing.
+    """K_k, z_k, p_k, lambda_{k+1}, Psi_{k+1}, and before them F_k: name and formula, in the order
+    of computing.
 
-    Those of the filter, `kfcourse.filters.EQUATIONS`, with the formulas of the structure; h_k and G_k have lines of their own
-    only where they are long.
+    Those of the filter, `kfcourse.filters.EQUATIONS`, with the formulas of the structure; h_k and
+    G_k have lines of their own only where they are long.
     """
     values = function_values(structure)
     equations: list[tuple[sp.Symbol, sp.Expr]] = []
     short: dict[sp.Symbol, sp.Expr] = {}
     for equation in EQUATIONS["aof"]:
         name, formula = scalar(equation.lhs), scalar(equation.rhs).xreplace(values).xreplace(short)
-        if name in (scalar(s.h), scalar(s.G)) and symbols(formula_latex(formula, _VARIABLES)) <= SHORT:
+        if (
+            name in (scalar(s.h), scalar(s.G))
+            and symbols(formula_latex(formula, _VARIABLES)) <= SHORT
+        ):
             short[name] = formula
         else:
             equations.append((name, formula))

@@ -13,14 +13,17 @@ from kfcourse.linear.system import LinearSystem
 
 
 class Covariances(NamedTuple):
-    """Covariance analysis: predicted (steps, n, n), posterior (steps, n, n), gains (steps, n, p)."""
+    """Covariance analysis: predicted (steps, n, n), posterior (steps, n, n), gains (steps, n,
+    p)."""
 
     predicted: Array
     posterior: Array
     gains: Array
 
 
-def covariances(system: LinearSystem, prior_cov: Array, steps: int, gains: Array | None = None) -> Covariances:
+def covariances(
+    system: LinearSystem, prior_cov: Array, steps: int, gains: Array | None = None
+) -> Covariances:
     """Accuracy in advance: covariances of the error, which no measurement enters.
 
     Parameters
@@ -31,8 +34,9 @@ def covariances(system: LinearSystem, prior_cov: Array, steps: int, gains: Array
         True covariance of the error before y_0.
     steps : int
     gains : ndarray (steps, n, p) or (n, p), optional
-        Gains of another linear filter with the same A and H (one of a wrong model, or constant): its true errors are then
-        found, P = (I - K H) P^- (I - K H)^T + K R K^T for any K.  By default the optimal gains.
+        Gains of another linear filter with the same A and H (one of a wrong model, or constant):
+        its true errors are then found, P = (I - K H) P^- (I - K H)^T + K R K^T for any K.  By
+        default the optimal gains.
 
     Raises
     ------
@@ -44,11 +48,17 @@ def covariances(system: LinearSystem, prior_cov: Array, steps: int, gains: Array
     if cov.shape != (n, n):
         raise ValueError(f"the prior's covariance must have the shape ({n}, {n}), got {cov.shape}")
     if gains is not None and np.shape(gains) not in ((n, p), (steps, n, p)):
-        raise ValueError(f"gains must have the shape ({steps}, {n}, {p}) or ({n}, {p}), got {np.shape(gains)}")
+        raise ValueError(
+            f"gains must have the shape ({steps}, {n}, {p}) or ({n}, {p}), got {np.shape(gains)}"
+        )
     given = None if gains is None else np.broadcast_to(gains, (steps, n, p))
     rows = []
     for k in range(steps):
-        K = gain(cov @ system.H.T, system.measure(np.zeros(len(cov)), cov).F) if given is None else given[k]
+        K = (
+            gain(cov @ system.H.T, system.measure(np.zeros(len(cov)), cov).F)
+            if given is None
+            else given[k]
+        )
         rest = np.eye(len(cov)) - K @ system.H
         posterior = symmetric(rest @ cov @ rest.T + K @ system.R @ K.T)
         rows.append((cov, posterior, K))
@@ -72,8 +82,8 @@ def steady_state(system: LinearSystem) -> Steady:
     Raises
     ------
     ValueError
-        There is none with which the filter's errors die out: a part of the state does not decay, and is not seen, or neither
-        grows nor has noise.
+        There is none with which the filter's errors die out: a part of the state does not decay,
+        and is not seen, or neither grows nor has noise.
     """
     A, H, Q, R = system.A, system.H, system.Q, system.R
     try:
@@ -81,7 +91,8 @@ def steady_state(system: LinearSystem) -> Steady:
         measurement = system.measure(np.zeros(len(A)), predicted)
         posterior = correct(Gaussian(np.zeros(len(A)), predicted), measurement, measurement.h).cov
         K = gain(predicted @ H.T, measurement.F)
-        # Of what neither grows nor has noise SciPy finds any matrix: its root, at 1, to the square root of rounding
+        # Of what neither grows nor has noise SciPy finds any matrix: its root, at 1, to the square
+        # root of rounding
         left = np.abs(A @ posterior @ A.T + Q - predicted).max()
         exact = left <= 100 * np.sqrt(np.finfo(A.dtype).eps) * np.abs(predicted).max()
         settles = exact and np.abs(np.linalg.eigvals(A - A @ K @ H)).max() < 1 - 1e-7
@@ -89,7 +100,9 @@ def steady_state(system: LinearSystem) -> Steady:
         settles = False
     if not settles:
         raise ValueError(
-            "the Riccati equation has no stabilising solution: a part of the state does not decay, and is not seen by the meter, "
-            "or neither grows nor has noise; use covariances(system, ...) to follow the filter step by step"
+            "the Riccati equation has no stabilising solution: a part of the state does not "
+            "decay, and is not seen by the meter, "
+            "or neither grows nor has noise; use covariances(system, ...) to follow the filter "
+            "step by step"
         )
     return Steady(predicted, posterior, K)

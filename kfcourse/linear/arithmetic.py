@@ -2,10 +2,12 @@
 
 All five are the same filter on paper.  They differ in what rounding does to the covariance:
 
-    `covariance`   P = (I - K H) P^-                          as in the textbook; may turn asymmetric or negative
+    `covariance`   P = (I - K H) P^-                          as in the textbook; may
+                   turn asymmetric or negative
     `symmetrised`  the same, then (P + P^T) / 2               symmetric, may still be negative
     `joseph`       P = (I - K H) P^- (I - K H)^T + K R K^T    a sum of non-negative terms
-    `square-root`  S with P = S S^T, by orthogonal transformations; P is never formed.  R must be positive definite
+    `square-root`  S with P = S S^T, by orthogonal transformations; P is never formed.
+                   R must be positive definite
     `ud`           U, D with P = U D U^T, without square roots; see `factored`
 """
 
@@ -35,7 +37,8 @@ from kfcourse.linear.system import LinearSystem
 
 
 class Root(NamedTuple):
-    """A normal law by a square root of its covariance: mean (..., n), root (..., n, n), cov = root root^T."""
+    """A normal law by a square root of its covariance: mean (..., n), root (..., n, n), cov = root
+    root^T."""
 
     mean: Vectors
     root: Matrices
@@ -75,7 +78,10 @@ def _correct_textbook(system: LinearSystem, law: Gaussian, y: Vectors) -> Gaussi
     innovation, H, R = _measured(system, y - apply(system.H, law.mean))
     cross = law.cov @ transpose(H)
     K = gain(cross, H @ cross + R, broken=True)
-    return Gaussian(law.mean + apply(K, innovation), (np.eye(len(system.A), dtype=law.cov.dtype) - K @ H) @ law.cov)
+    return Gaussian(
+        law.mean + apply(K, innovation),
+        (np.eye(len(system.A), dtype=law.cov.dtype) - K @ H) @ law.cov,
+    )
 
 
 def _correct_symmetrised(system: LinearSystem, law: Gaussian, y: Vectors) -> Gaussian:
@@ -98,7 +104,10 @@ def _measured(system: LinearSystem, innovation: Vectors) -> tuple[Vectors, Matri
 
 def _predict_root(system: LinearSystem, law: Root, shift: Vectors | float) -> Root:
     """[A S, Q^(1/2)] made triangular: its product with its transpose is A P A^T + Q."""
-    return Root(apply(system.A, law.mean) + shift, _triangular(_beside(system.A @ law.root, square_root(system.Q))))
+    return Root(
+        apply(system.A, law.mean) + shift,
+        _triangular(_beside(system.A @ law.root, square_root(system.Q))),
+    )
 
 
 def _correct_root(system: LinearSystem, law: Root, y: Vectors) -> Root:
@@ -130,24 +139,31 @@ def _broadcast(left: Array, right: Array) -> list[Array]:
 def _triangular(wide: Matrices) -> Matrices:
     """Lower triangular L with L L^T = wide wide^T, by Householder's reflections of the columns.
 
-    In the precision of `wide`: numpy.linalg.qr computes float32 in double, which would hide what short words do.
+    In the precision of `wide`: numpy.linalg.qr computes float32 in double, which would hide what
+    short words do.
     """
     work, rows = np.array(wide), wide.shape[-2]
     for i in range(rows):
         size = np.abs(work[..., i, i:]).max(axis=-1, keepdims=True)
-        v = work[..., i, i:] / np.where(size > 0, size, 1)  # no square leaves the range of short words
+        # no square leaves the range of short words
+        v = work[..., i, i:] / np.where(size > 0, size, 1)
         v[..., 0] += np.copysign(np.sqrt((v * v).sum(axis=-1)), v[..., 0])
         square = (v * v).sum(axis=-1)
         factor = 2 / np.where(square > 0, square, 1)
-        work[..., i:, i:] -= (apply(work[..., i:, i:], v) * factor[..., None])[..., None] * v[..., None, :]
+        work[..., i:, i:] -= (apply(work[..., i:, i:], v) * factor[..., None])[..., None] * v[
+            ..., None, :
+        ]
     return np.tril(work[..., :rows])
 
 
 def _forward(lower: Array, right: Array) -> Array:
-    """The solution x of lower x = right for a triangular matrix, in its precision: (..., p, p), (..., p) -> (..., p)."""
+    """The solution x of lower x = right for a triangular matrix, in its precision: (..., p, p),
+    (..., p) -> (..., p)."""
     x = np.zeros(np.broadcast_shapes(lower.shape[:-1], right.shape), dtype=lower.dtype)
     for i in range(right.shape[-1]):
-        x[..., i] = (right[..., i] - (lower[..., i, :i] * x[..., :i]).sum(axis=-1)) / lower[..., i, i]
+        x[..., i] = (right[..., i] - (lower[..., i, :i] * x[..., :i]).sum(axis=-1)) / lower[
+            ..., i, i
+        ]
     return x
 
 
@@ -175,9 +191,13 @@ FORMS: dict[str, Form] = {
 
 
 def form(name: str, system: LinearSystem) -> Form:
-    """The arithmetic form of that name; ValueError if there is none, or the system does not allow it."""
+    """The arithmetic form of that name; ValueError if there is none, or the system does not allow
+    it."""
     if name not in FORMS:
         raise ValueError(f"no form {name!r} of the Kalman filter; known: {', '.join(FORMS)}")
     if name == "square-root" and np.linalg.eigvalsh(system.R).min() <= 0:
-        raise ValueError("the square-root form divides by the noise of the meter: R must be positive definite; use joseph")
+        raise ValueError(
+            "the square-root form divides by the noise of the meter: R must be positive definite; "
+            "use joseph"
+        )
     return FORMS[name]

@@ -1,12 +1,13 @@
 """Is a filter right about its own errors?  Tests of its covariance and of its innovations.
 
     NEES   e^T p^-1 e,       e = x_k - z_k            needs the true state: simulation
-    NIS    nu^T F^-1 nu,     nu = y_k - h             needs only measurements: works on the real thing
+    NIS   nu^T F^-1 nu,   nu = y_k - h   needs only measurements: works on the real thing
     whiteness of the innovations                      likewise
     confidence ellipse  e^T p^-1 e < rho^2, of two components
 
-For a filter that is right, and normal laws, NEES and NIS are chi-squared with n and p degrees of freedom, and
-innovations of different steps are uncorrelated.  Bar-Shalom, Li, Kirubarajan (2001), section 5.4.
+For a filter that is right, and normal laws, NEES and NIS are chi-squared with n and p degrees of
+freedom, and innovations of different steps are uncorrelated.  Bar-Shalom, Li, Kirubarajan (2001),
+section 5.4.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ from kfcourse.laws import CONFIDENCE, Array, Gaussian, Measurement, normalised_s
 
 
 def confidence_ellipse(law: Gaussian, probability: float = CONFIDENCE, points: int = 200) -> Array:
-    """Border of the smallest region that holds two components with the given probability, (2, points).
+    """Border of the smallest region that holds two components with the given probability, (2,
+    points).
 
-    e^T p^-1 e = rho^2 with e = x - mean and rho = sqrt(-2 ln(1 - probability)): e^T p^-1 e is chi-squared with two degrees.
+    e^T p^-1 e = rho^2 with e = x - mean and rho = sqrt(-2 ln(1 - probability)): e^T p^-1 e is
+    chi-squared with two degrees.
 
     Parameters
     ----------
@@ -41,7 +44,10 @@ def confidence_ellipse(law: Gaussian, probability: float = CONFIDENCE, points: i
         The law is not one of two components, or the probability is not between 0 and 1.
     """
     if np.shape(law.mean) != (2,) or np.shape(law.cov) != (2, 2):
-        raise ValueError(f"expected the law of two components of one run, got shapes {np.shape(law.mean)}, {np.shape(law.cov)}")
+        raise ValueError(
+            f"expected the law of two components of one run, got shapes {np.shape(law.mean)}, "
+            f"{np.shape(law.cov)}"
+        )
     if not 0 < probability < 1:
         raise ValueError(f"expected a probability between 0 and 1, got {probability}")
     turn = np.linspace(0, 2 * np.pi, points)
@@ -50,13 +56,16 @@ def confidence_ellipse(law: Gaussian, probability: float = CONFIDENCE, points: i
 
 
 class Innovations(NamedTuple):
-    """What the measurements told beyond the prediction: value (steps, runs, p), and the covariance expected, (..., p, p)."""
+    """What the measurements told beyond the prediction: value (steps, runs, p), and the covariance
+    expected, (..., p, p)."""
 
     value: Array
     cov: Array
 
 
-def innovations(measure: Callable[[Array, Array], Measurement], predicted: Gaussian, y: Array) -> Innovations:
+def innovations(
+    measure: Callable[[Array, Array], Measurement], predicted: Gaussian, y: Array
+) -> Innovations:
     """Innovations nu = y - h(lambda, Psi) and their covariances F(lambda, Psi).
 
     Parameters
@@ -86,7 +95,8 @@ def nees(x: Array, posterior: Gaussian, angles: Components = ()) -> Array:
 
 
 def nis(found: Innovations) -> Array:
-    """Normalised innovation squared, (steps, runs): mean p for a filter that is right; NaN where y is missing.
+    """Normalised innovation squared, (steps, runs): mean p for a filter that is right; NaN where y
+    is missing.
 
     Raises
     ------
@@ -98,19 +108,31 @@ def nis(found: Innovations) -> Array:
 
 def _regular(cov: Array) -> Array:
     if not np.linalg.det(cov).all():
-        raise ValueError("a covariance is singular: leave out the components that the filter knows exactly")
+        raise ValueError(
+            "a covariance is singular: leave out the components that the filter knows exactly"
+        )
     return cov
 
 
-def chi_squared_bounds(degrees: int, runs: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Interval in which the mean over `runs` of a chi-squared quantity lies with the given probability.
+def chi_squared_bounds(
+    degrees: int, runs: int, confidence: float = CONFIDENCE
+) -> tuple[float, float]:
+    """Interval in which the mean over `runs` of a chi-squared quantity lies with the given
+    probability.
 
-    The sum of independent chi-squared numbers is chi-squared with runs * degrees degrees of freedom.  Only *independent* terms
-    may be counted: NEES of different runs, not of successive steps; NIS of successive steps too.
+    The sum of independent chi-squared numbers is chi-squared with runs * degrees degrees of
+    freedom.  Only *independent* terms may be counted: NEES of different runs, not of successive
+    steps; NIS of successive steps too.
     """
     if degrees < 1 or runs < 1 or not 0 < confidence < 1:
-        raise ValueError(f"expected degrees >= 1, runs >= 1 and 0 < confidence < 1, got {degrees}, {runs}, {confidence}")
-    low, high = (float(scipy.special.chdtri(degrees * runs, above)) for above in ((1 + confidence) / 2, (1 - confidence) / 2))
+        raise ValueError(
+            f"expected degrees >= 1, runs >= 1 and 0 < confidence < 1, got {degrees}, {runs}, "
+            f"{confidence}"
+        )
+    low, high = (
+        float(scipy.special.chdtri(degrees * runs, above))
+        for above in ((1 + confidence) / 2, (1 - confidence) / 2)
+    )
     return low / runs, high / runs
 
 
@@ -123,8 +145,8 @@ def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
         |sum_k s_k|^2 / N                           chi-squared with p
         (sum_k s_k^T s_{k+1})^2 / (p (N - 1))       chi-squared with 1, for large N
 
-    Size is suspect on both sides, the others only above.  For these, s_k is divided by its root mean square in the record: a
-    wrong size alone is no alarm of theirs.
+    Size is suspect on both sides, the others only above.  For these, s_k is divided by its root
+    mean square in the record: a wrong size alone is no alarm of theirs.
 
     Raises
     ------
@@ -142,7 +164,8 @@ def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
     return np.stack(
         [
             (p * size < low) | (p * size > high),
-            (white.sum(axis=0) ** 2).sum(axis=-1) / steps > chi_squared_bounds(p, 1, 2 * confidence - 1)[1],
+            (white.sum(axis=0) ** 2).sum(axis=-1) / steps
+            > chi_squared_bounds(p, 1, 2 * confidence - 1)[1],
             neighbours**2 / (p * (steps - 1)) > chi_squared_bounds(1, 1, 2 * confidence - 1)[1],
         ]
     )
@@ -151,21 +174,26 @@ def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
 def _white(found: Innovations) -> Array:
     """s_k = F^(-1/2) nu_k, (steps, runs, p)."""
     if np.isnan(found.value).any():
-        raise ValueError("this test needs measurements at every step; select the steps at which they are there")
+        raise ValueError(
+            "this test needs measurements at every step; select the steps at which they are there"
+        )
     return np.linalg.solve(np.linalg.cholesky(found.cov), found.value[..., None])[..., 0]
 
 
 class Autocorrelation(NamedTuple):
-    """Correlation of innovations `lag` steps apart, (lags,), and its standard deviation for a filter that is right."""
+    """Correlation of innovations `lag` steps apart, (lags,), and its standard deviation for a
+    filter that is right."""
 
     value: Array
     standard_deviation: Array
 
 
 def autocorrelation(found: Innovations, lags: int) -> Autocorrelation:
-    """Correlation of whitened innovations s_k = F^(-1/2) nu_k, M[s_k^T s_{k+l}] / p for l = 1 ... lags.
+    """Correlation of whitened innovations s_k = F^(-1/2) nu_k, M[s_k^T s_{k+l}] / p for l = 1 ...
+    lags.
 
-    The mean is over steps and runs.  White innovations give 0 with the standard deviation 1 / sqrt(p * number of pairs).
+    The mean is over steps and runs.  White innovations give 0 with the standard deviation 1 /
+    sqrt(p * number of pairs).
     """
     steps, runs, p = found.value.shape
     if not 0 < lags < steps:

@@ -1,7 +1,9 @@
-r"""The UD form: a covariance as P = U D U^T, U upper triangular with ones on its diagonal, D diagonal.
+r"""The UD form: a covariance as P = U D U^T, U upper triangular with ones on its diagonal, D
+diagonal.
 
-It has the digits of the square root (D holds the variances, no difference of covariances is formed) and takes no square roots.
-Measurements are used one after the other; several at once are first made independent by the factors of R.
+It has the digits of the square root (D holds the variances, no difference of covariances is formed)
+and takes no square roots. Measurements are used one after the other; several at once are first made
+independent by the factors of R.
 
     correct    Bierman's update by one scalar measurement
     predict    Thornton's: the rows of [A U, U_Q] made orthogonal with the weights (D, D_Q)
@@ -19,7 +21,8 @@ from kfcourse.laws import Array, Matrices, Vectors, apply, symmetric
 
 
 class Factors(NamedTuple):
-    """A normal law by the factors of its covariance: mean (..., n), unit (..., n, n), diagonal (..., n).
+    """A normal law by the factors of its covariance: mean (..., n), unit (..., n, n), diagonal
+    (..., n).
 
     `cov` = `unit` diag(`diagonal`) `unit`^T
     """
@@ -30,7 +33,8 @@ class Factors(NamedTuple):
 
 
 def factors(cov: Matrices) -> tuple[Matrices, Vectors]:
-    """U (..., n, n) and D (..., n) of a covariance, U D U^T = cov; a variance that rounding made negative is taken as 0."""
+    """U (..., n, n) and D (..., n) of a covariance, U D U^T = cov; a variance that rounding made
+    negative is taken as 0."""
     rest, n = np.array(cov), cov.shape[-1]
     unit, diagonal = np.zeros_like(rest), np.zeros_like(rest[..., 0])
     for j in reversed(range(n)):
@@ -38,7 +42,9 @@ def factors(cov: Matrices) -> tuple[Matrices, Vectors]:
         unit[..., : j + 1, j] = _ratio(rest[..., : j + 1, j], diagonal[..., j, None])
         unit[..., j, j] = 1
         column = unit[..., :j, j]
-        rest[..., :j, :j] -= diagonal[..., j, None, None] * column[..., :, None] * column[..., None, :]
+        rest[..., :j, :j] -= (
+            diagonal[..., j, None, None] * column[..., :, None] * column[..., None, :]
+        )
     return unit, diagonal
 
 
@@ -48,11 +54,14 @@ def product(unit: Matrices, diagonal: Vectors) -> Matrices:
 
 
 def predict_factors(A: Matrices, law: Factors, shift: Vectors | float, Q: Matrices) -> Factors:
-    """A m + shift, and the factors of A P A^T + Q: Gram and Schmidt's orthogonal rows, in the modified order."""
+    """A m + shift, and the factors of A P A^T + Q: Gram and Schmidt's orthogonal rows, in the
+    modified order."""
     noise, strength = factors(Q)
     lead = law.unit.shape[:-2]
     rows = np.concatenate([A @ law.unit, np.broadcast_to(noise, lead + noise.shape)], axis=-1)
-    weights = np.concatenate([law.diagonal, np.broadcast_to(strength, lead + strength.shape)], axis=-1)
+    weights = np.concatenate(
+        [law.diagonal, np.broadcast_to(strength, lead + strength.shape)], axis=-1
+    )
     unit, diagonal = np.zeros_like(law.unit), np.zeros_like(law.diagonal)
     for j in reversed(range(A.shape[0])):
         last = rows[..., j, :].copy()
@@ -65,9 +74,11 @@ def predict_factors(A: Matrices, law: Factors, shift: Vectors | float, Q: Matric
 
 
 def correct_factors(law: Factors, innovation: Vectors, H: Matrices, R: Matrices) -> Factors:
-    """Mean and factors after measurements y = H x + w, w ~ N(0, R), with innovation y - H m (..., p)."""
+    """Mean and factors after measurements y = H x + w, w ~ N(0, R), with innovation y - H m (...,
+    p)."""
     mixing, noise = factors(R)
-    apart = np.linalg.inv(mixing).astype(R.dtype)  # of a triangular matrix with ones on its diagonal
+    # of a triangular matrix with ones on its diagonal
+    apart = np.linalg.inv(mixing).astype(R.dtype)
     innovation, H = apply(apart, innovation), apart @ H
     change, unit, diagonal = np.zeros_like(law.mean), law.unit, law.diagonal
     for j in range(innovation.shape[-1]):
@@ -77,11 +88,13 @@ def correct_factors(law: Factors, innovation: Vectors, H: Matrices, R: Matrices)
     return Factors(law.mean + change, unit, diagonal)
 
 
-def bierman(unit: Matrices, diagonal: Vectors, h: Vectors, noise: Array) -> tuple[Matrices, Vectors, Vectors]:
+def bierman(
+    unit: Matrices, diagonal: Vectors, h: Vectors, noise: Array
+) -> tuple[Matrices, Vectors, Vectors]:
     """Factors after the measurement h^T x + w, w ~ N(0, noise), and the gain (..., n).
 
-    f = U^T h,  v = D f;  alpha_j = noise + f_1 v_1 + ... + f_j v_j;  D_j <- D_j alpha_{j-1} / alpha_j,
-    column j of U <- u_j - (f_j / alpha_{j-1}) (U v)_{1 ... j-1}.
+    f = U^T h,  v = D f;  alpha_j = noise + f_1 v_1 + ... + f_j v_j;  D_j <- D_j alpha_{j-1} /
+    alpha_j, column j of U <- u_j - (f_j / alpha_{j-1}) (U v)_{1 ... j-1}.
 
     Parameters
     ----------
@@ -93,12 +106,17 @@ def bierman(unit: Matrices, diagonal: Vectors, h: Vectors, noise: Array) -> tupl
     """
     f = apply(np.swapaxes(unit, -1, -2), h)
     v = diagonal * f
-    lead = np.broadcast_shapes(v.shape[:-1], noise.shape)  # a measurement may be missing in some runs only
-    unit, diagonal = (np.broadcast_to(one, lead + one.shape[-size:]).copy() for one, size in ((unit, 2), (diagonal, 1)))
+    # a measurement may be missing in some runs only
+    lead = np.broadcast_shapes(v.shape[:-1], noise.shape)
+    unit, diagonal = (
+        np.broadcast_to(one, lead + one.shape[-size:]).copy()
+        for one, size in ((unit, 2), (diagonal, 1))
+    )
     before, K = np.broadcast_to(noise, lead), np.zeros_like(diagonal)
     for j in range(v.shape[-1]):
         after = before + f[..., j] * v[..., j]
-        diagonal[..., j] *= np.where(after > 0, _ratio(before, after), 1)  # nothing told, nothing changed
+        # nothing told, nothing changed
+        diagonal[..., j] *= np.where(after > 0, _ratio(before, after), 1)
         column = unit[..., :, j].copy()
         unit[..., :j, j] -= _ratio(f[..., j], before)[..., None] * K[..., :j]
         K += column * v[..., j, None]

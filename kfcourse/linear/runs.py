@@ -26,13 +26,20 @@ class Trajectories(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A filter's laws along stored measurements: posterior and predicted, each mean (steps, runs, n), cov (steps, runs, n, n)."""
+    """A filter's laws along stored measurements: posterior and predicted, each mean (steps, runs,
+    n), cov (steps, runs, n, n)."""
 
     posterior: Gaussian
     predicted: Gaussian
 
 
-def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None, arithmetic: str = "joseph") -> Run:
+def run(
+    system: LinearSystem,
+    prior: Gaussian,
+    y: Array,
+    u: Array | None = None,
+    arithmetic: str = "joseph",
+) -> Run:
     """The Kalman filter over stored measurements.
 
     Parameters
@@ -45,23 +52,27 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
     u : ndarray (steps, runs, m) or (steps, 1, m), optional
         Known input; u[k] acts between y[k] and y[k+1].
     arithmetic : {"joseph", "covariance", "symmetrised", "square-root", "ud"}
-        All of it runs in the precision of the system's matrices, but for the gain from p > 1 measurements at once: NumPy
-        solves float32 equations in double and rounds the solution.
+        All of it runs in the precision of the system's matrices, but for the gain from p > 1
+        measurements at once: NumPy solves float32 equations in double and rounds the solution.
 
     Returns
     -------
     Run
-        Means (steps, runs, n) and covariances (steps, runs, n, n).  Covariances that are the same for all runs, because no
-        measurement is missing, are stored once and shown to each run: a read-only view.
+        Means (steps, runs, n) and covariances (steps, runs, n, n).  Covariances that are the same
+        for all runs, because no measurement is missing, are stored once and shown to each run: a
+        read-only view.
 
     Raises
     ------
     ValueError
-        Shapes that do not fit; no measurements, infinite ones, a prior or inputs that are not finite.
+        Shapes that do not fit; no measurements, infinite ones, a prior or inputs that are not
+        finite.
     """
     chosen = form(arithmetic, system)
     if y.ndim != 3 or y.shape[2] != len(system.H):
-        raise ValueError(f"measurements must have the shape (steps, runs, {len(system.H)}), got {y.shape}")
+        raise ValueError(
+            f"measurements must have the shape (steps, runs, {len(system.H)}), got {y.shape}"
+        )
     if not y.size or np.isinf(y).any():
         raise ValueError("measurements must be there, and finite: write NaN where one is missing")
     runs, n, dtype = y.shape[1], len(system.A), system.A.dtype
@@ -74,7 +85,9 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
         predicted.append(chosen.law(state))
         state = chosen.correct(system, state, measurement)
         posterior.append(chosen.law(state))
-        state = chosen.predict(system, state, system.input(None if u is None else u[k].astype(dtype)))
+        state = chosen.predict(
+            system, state, system.input(None if u is None else u[k].astype(dtype))
+        )
     return Run(stacked(posterior), stacked(predicted))
 
 
@@ -86,26 +99,48 @@ def _check_input(system: LinearSystem, u: Array | None, steps: int, runs: int) -
         return
     m = system.B.shape[1]
     if u.ndim != 3 or len(u) != steps or u.shape[1] not in (1, runs) or u.shape[2] != m:
-        raise ValueError(f"inputs must have the shape ({steps}, {runs}, {m}), or ({steps}, 1, {m}) for all runs; got {u.shape}")
+        raise ValueError(
+            f"inputs must have the shape ({steps}, {runs}, {m}), or ({steps}, 1, {m}) for all "
+            f"runs; got {u.shape}"
+        )
     if not np.isfinite(u).all():
-        raise ValueError("inputs must be finite: give a missing input the value that the object had, or its mean with a larger Q")
+        raise ValueError(
+            "inputs must be finite: give a missing input the value that the object had, or its "
+            "mean with a larger Q"
+        )
 
 
 def check_prior(prior: Gaussian, runs: int, n: int) -> None:
     """ValueError unless this is a law of n components, for each of so many runs or for all."""
     mean, cov = np.shape(prior.mean), np.shape(prior.cov)
     if mean not in ((n,), (1, n), (runs, n)):
-        raise ValueError(f"the prior's mean must have the shape ({n},) or ({runs}, {n}), got {mean}")
+        raise ValueError(
+            f"the prior's mean must have the shape ({n},) or ({runs}, {n}), got {mean}"
+        )
     if cov not in ((n, n), (1, n, n), (runs, n, n)):
-        raise ValueError(f"the prior's covariance must have the shape ({n}, {n}) or ({runs}, {n}, {n}), got {cov}")
+        raise ValueError(
+            f"the prior's covariance must have the shape ({n}, {n}) or ({runs}, {n}, {n}), got "
+            f"{cov}"
+        )
     if not (np.isfinite(prior.mean).all() and np.isfinite(prior.cov).all()):
-        raise ValueError("the prior must be finite: for an unknown state give a large variance, or start from measurements")
+        raise ValueError(
+            "the prior must be finite: for an unknown state give a large variance, or start from "
+            "measurements"
+        )
     if (np.diagonal(prior.cov, axis1=-2, axis2=-1) < 0).any():
-        raise ValueError(f"the prior's variances must not be negative, got the covariance {np.asarray(prior.cov).tolist()}")
+        raise ValueError(
+            f"the prior's variances must not be negative, got the covariance "
+            f"{np.asarray(prior.cov).tolist()}"
+        )
 
 
 def simulate(
-    system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: int | np.random.Generator, u: Array | None = None
+    system: LinearSystem,
+    prior: Gaussian,
+    steps: int,
+    runs: int,
+    seed: int | np.random.Generator,
+    u: Array | None = None,
 ) -> Trajectories:
     """Trajectories of the system with normal noises, from x_0 drawn from the prior.
 

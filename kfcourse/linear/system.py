@@ -64,34 +64,46 @@ class LinearSystem:
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(
-                    f"{name} has the shape {getattr(self, name).shape}; with {n} states and {p} measurements it is {shape}"
+                    f"{name} has the shape {getattr(self, name).shape}; with {n} states and {p} "
+                    f"measurements it is {shape}"
                 )
         if self.B is not None and len(self.B) != n:
             raise ValueError(f"B has {len(self.B)} rows; with {n} states it has {n}")
         for name in "QR":
             cov = getattr(self, name)
             if not np.array_equal(cov, cov.T):
-                raise ValueError(f"{name} is a covariance and must be symmetric, got {cov.tolist()}")
+                raise ValueError(
+                    f"{name} is a covariance and must be symmetric, got {cov.tolist()}"
+                )
             values = np.linalg.eigvalsh(cov)
-            if values.min() < -1e-6 * max(values.max(), 0.0):  # rounding of eigvalsh, in float32 too
-                raise ValueError(f"{name} is a covariance and must not be negative, got {cov.tolist()}")
+            # rounding of eigvalsh, in float32 too
+            if values.min() < -1e-6 * max(values.max(), 0.0):
+                raise ValueError(
+                    f"{name} is a covariance and must not be negative, got {cov.tolist()}"
+                )
 
     def astype(self, dtype: Any) -> LinearSystem:
         """The same matrices in another arithmetic, such as numpy.float32."""
         matrices = (self.A, self.H, self.Q, self.R, self.B)
-        return LinearSystem(*(None if matrix is None else matrix.astype(dtype) for matrix in matrices))  # type: ignore[arg-type]
+        converted = (None if matrix is None else matrix.astype(dtype) for matrix in matrices)
+        return LinearSystem(*converted)  # type: ignore[arg-type]
 
     def input(self, u: Vectors | None) -> Vectors | float:
         """B u, (..., n); 0 without an input."""
         if u is None:
             return 0.0
         if self.B is None:
-            raise ValueError("an input u was given, but the system has no matrix B; pass LinearSystem(A, H, Q, R, B)")
+            raise ValueError(
+                "an input u was given, but the system has no matrix B; pass LinearSystem(A, H, Q, "
+                "R, B)"
+            )
         return apply(self.B, u)
 
     def measure(self, m: Vectors, d: Matrices) -> Measurement:
         """Structural functions of the meter: h = H m, G = H, F = H d H^T + R."""
-        return Measurement(apply(self.H, m), self.H, symmetric(self.H @ d @ self.H.T) + self.R, self.R)
+        return Measurement(
+            apply(self.H, m), self.H, symmetric(self.H @ d @ self.H.T) + self.R, self.R
+        )
 
 
 def linear_system(model: Model) -> tuple[LinearSystem, Vectors, Vectors]:
@@ -106,7 +118,8 @@ def linear_system(model: Model) -> tuple[LinearSystem, Vectors, Vectors]:
 
 
 def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, Vectors, Vectors]]:
-    """Step to the matrices and constants, as of `linear_system`, of a linear model that may depend on the step.
+    """Step to the matrices and constants, as of `linear_system`, of a linear model that may depend
+    on the step.
 
     Raises
     ------
@@ -121,7 +134,9 @@ def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, V
     return lambda k: _system(model, state.at(k)(), meter.at(k)())
 
 
-def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tuple[LinearSystem, Vectors, Vectors]:
+def _system(
+    model: Model, state: Sequence[Array], meter: Sequence[Array]
+) -> tuple[LinearSystem, Vectors, Vectors]:
     (A, B, a0), (H, C, b0) = state, meter
     Q, R = (M @ law.cov @ M.T for M, law in ((B, model.state_noise), (C, model.meter_noise)))
     system = LinearSystem(A, H, symmetric(Q), symmetric(R))
@@ -131,10 +146,15 @@ def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tup
 def is_linear(model: Model) -> bool:
     """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
     sides = (model.difference_equation("a linear system"), model.v), (model.meter_equation, model.w)
-    return all(_constant(_slopes(equation, [*model.x, *noise], model), equation, [*model.x, *noise]) for equation, noise in sides)
+    return all(
+        _constant(_slopes(equation, [*model.x, *noise], model), equation, [*model.x, *noise])
+        for equation, noise in sides
+    )
 
 
-def _constant(slopes: sp.MatrixBase, equation: sp.MatrixBase, variables: Sequence[sp.Symbol]) -> bool:
+def _constant(
+    slopes: sp.MatrixBase, equation: sp.MatrixBase, variables: Sequence[sp.Symbol]
+) -> bool:
     """Whether the equation has the same slopes everywhere, and no jumps."""
     return not slopes.has(*variables, sp.DiracDelta) and not decides(equation, variables)
 
@@ -143,11 +163,16 @@ def _slopes(equation: sp.MatrixBase, symbols: Sequence[sp.Symbol], model: Model)
     return equation.subs(model.values).jacobian(sp.Matrix(symbols)).applyfunc(sp.expand)
 
 
-def _affine(equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model) -> Stepwise:
+def _affine(
+    equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model
+) -> Stepwise:
     """Matrices of equation = A x + B noise + constant, as a function of the step."""
     slopes = _slopes(equation, [*x, *noise], model)
     if not _constant(slopes, equation, [*x, *noise]):
-        raise ModelError(f"{list(equation)} is not linear, so the Kalman filter does not apply; use aof(linearised(model))")
+        raise ModelError(
+            f"{list(equation)} is not linear, so the Kalman filter does not apply; use "
+            f"aof(linearised(model))"
+        )
     constant = equation.subs(model.values).subs(dict.fromkeys([*x, *noise], 0))
     outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": constant}
     return Stepwise.compile(model.known, "matrices", {}, outputs, ["constant"])

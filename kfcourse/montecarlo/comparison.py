@@ -1,4 +1,5 @@
-"""What a comparison of filters found: error statistics per step, differences, ranking, distance from the exact filter."""
+"""What a comparison of filters found: error statistics per step, differences, ranking, distance
+from the exact filter."""
 
 from __future__ import annotations
 
@@ -17,16 +18,20 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.writing import by_thousands
 
 EXACT = "aof-exact"
-ROUNDING = (64 * np.finfo(float).eps) ** 2  # an error variance less than this part of M|x|^2 is one of rounding
-UNHEALTHY = 0.1  # squared error of the exact filter's own, in its variance, from which on it bounds nothing
-BEATEN = 5.0  # standard errors by which a filter must be better than the exact one to refute it, at any step
+# an error variance less than this part of M|x|^2 is one of rounding
+ROUNDING = (64 * np.finfo(float).eps) ** 2
+# squared error of the exact filter's own, in its variance, from which on it bounds nothing
+UNHEALTHY = 0.1
+# standard errors by which a filter must be better than the exact one to refute it, at any step
+BEATEN = 5.0
 LOST = 100.0  # times the most accurate filter's D_k: ten times its error
 HEAVY = 0.1  # part of D_k that a single trajectory makes where the filter diverges on a few
 ALIKE = 1e-10  # of D_k: filters that differ by less coincide but for rounding
 
 
 class Verdict(NamedTuple):
-    """At one step: the most accurate filter, those that are not significantly worse, and the least accurate if it is worse."""
+    """At one step: the most accurate filter, those that are not significantly worse, and the least
+    accurate if it is worse."""
 
     best: str
     not_worse: list[str]
@@ -37,13 +42,15 @@ class Verdict(NamedTuple):
 class Comparison:
     """Statistics of filters on common trajectories; made by `kfcourse.compare`.
 
-    The accuracy of a filter is D_k = M[(x_k - z_k)^T (x_k - z_k)], the course's error variance (for a
-    vector state, the trace of M[(x - z)(x - z)^T]); `error_mean` tells how much of it is bias.
+    The accuracy of a filter is D_k = M[(x_k - z_k)^T (x_k - z_k)], the course's error variance (for
+    a vector state, the trace of M[(x - z)(x - z)^T]); `error_mean` tells how much of it is bias.
 
-    The exact AOF is no filter among others, but their bound: `gap` tells how far above it each of them is.  Where it ran, D_k is
-    its own variance and what the filter is above it (`excess`), by orthogonality; else it is the mean of the squared errors.
-    There is one estimate of each D_k, from which all else follows, so that table, ranking and verdict cannot disagree.  An
-    interval speaks of the filters as they were designed: another design ensemble gives somewhat other coefficients.
+    The exact AOF is no filter among others, but their bound: `gap` tells how far above it each of
+    them is.  Where it ran, D_k is its own variance and what the filter is above it (`excess`), by
+    orthogonality; else it is the mean of the squared errors. There is one estimate of each D_k,
+    from which all else follows, so that table, ranking and verdict cannot disagree.  An interval
+    speaks of the filters as they were designed: another design ensemble gives somewhat other
+    coefficients.
 
     Attributes
     ----------
@@ -57,8 +64,8 @@ class Comparison:
     left_out : dict
         Filters without results although they were wanted: name to the reason.
     smoothing : Comparison, optional
-        The same of smoothers on the same trajectories, if `compare` was given any: their error variances given the whole record,
-        and how far they are above the exact smoother.
+        The same of smoothers on the same trajectories, if `compare` was given any: their error
+        variances given the whole record, and how far they are above the exact smoother.
     """
 
     model: Model | JumpModel
@@ -72,7 +79,9 @@ class Comparison:
     smoothing: Comparison | None = None
 
     def __repr__(self) -> str:
-        compared = f"Comparison of {', '.join(self.names)}: {self.steps} steps, {self.runs} trajectories"
+        compared = (
+            f"Comparison of {', '.join(self.names)}: {self.steps} steps, {self.runs} trajectories"
+        )
         lines = [
             f"{by_thousands(compared)}, seed {self.seed}",
             *(f"left out: {name}, {why}" for name, why in self.left_out.items()),
@@ -93,7 +102,8 @@ class Comparison:
 
     @cached_property
     def control(self) -> str:
-        """The filter that others are related to where there is no bound: the Gaussian AOF if there, else the first.
+        """The filter that others are related to where there is no bound: the Gaussian AOF if there,
+        else the first.
 
         One that diverges is passed over.
         """
@@ -109,17 +119,20 @@ class Comparison:
 
     @property
     def rounding(self) -> Array:
-        """Error variances, (steps,), that may be of rounding alone: of states so large, in doubles."""
+        """Error variances, (steps,), that may be of rounding alone: of states so large, in
+        doubles."""
         return ROUNDING * self.sums.size.sum(axis=-1) / self.sums.weight.sum()
 
     @cached_property
     def without_error(self) -> Array:
-        """Steps, (steps,), at which the reference errs by rounding only: of such a bound no part can be told."""
+        """Steps, (steps,), at which the reference errs by rounding only: of such a bound no part
+        can be told."""
         return np.asarray(self._variance(self.reference)[:, 0] <= self.rounding)
 
     @cached_property
     def doubtful(self) -> Array:
-        """Steps, (steps,), at which what should be exact is not: it errs by too much itself, or a filter is more accurate."""
+        """Steps, (steps,), at which what should be exact is not: it errs by too much itself, or a
+        filter is more accurate."""
         if not self.has_bound:
             return np.zeros(self.steps, dtype=bool)
         bound = self._means("own", EXACT)
@@ -131,22 +144,28 @@ class Comparison:
 
     @property
     def usable(self) -> Array:
-        """Steps, (steps,), at which distances from the bound, or from the control, have a meaning."""
+        """Steps, (steps,), at which distances from the bound, or from the control, have a
+        meaning."""
         return ~(self.without_error | self.doubtful)
 
     @cached_property
     def lost(self) -> dict[str, Array]:
-        """Entrants that diverge on a few trajectories, and the steps, (steps,), at which these make `LOST` times the best D_k."""
+        """Entrants that diverge on a few trajectories, and the steps, (steps,), at which these make
+        `LOST` times the best D_k."""
         squares = {name: self._means("square", name)[..., 0].sum(axis=1) for name in self.entrants}
         most = LOST * np.min([*squares.values()], axis=0, initial=np.inf) + self.rounding
-        heavy = {name: self._largest(name) > HEAVY * squares[name] * self.sums.weight.sum() for name in squares}
+        heavy = {
+            name: self._largest(name) > HEAVY * squares[name] * self.sums.weight.sum()
+            for name in squares
+        }
         diverged = {name: heavy[name] & (squares[name] > most) for name in squares}
         return {name: steps for name, steps in diverged.items() if steps.any()}
 
     # --- accuracy
 
     def error_variance(self, name: str) -> Estimate:
-        """D_k per step, (steps,), with standard errors; for the exact AOF the mean of its own variance (`bound`)."""
+        """D_k per step, (steps,), with standard errors; for the exact AOF the mean of its own
+        variance (`bound`)."""
         return Estimate.jackknife(self._variance(name))
 
     def difference(self, first: str, second: str) -> Estimate:
@@ -155,7 +174,9 @@ class Comparison:
 
     def relative(self, name: str, reference: str | None = None) -> Estimate:
         """D_k(name) / D_k(reference or control), (steps,)."""
-        return Estimate.jackknife(ratio(self._variance(name), self._variance(reference or self.control), np.nan))
+        return Estimate.jackknife(
+            ratio(self._variance(name), self._variance(reference or self.control), np.nan)
+        )
 
     def score(self, name: str, steps: slice = slice(None)) -> Estimate:
         """The mean over steps of D_k(name) / D_k(control): one number for a filter."""
@@ -170,8 +191,9 @@ class Comparison:
         """D_k(name) - D_k(exact AOF), (steps,), by orthogonality.
 
         The error of the posterior mean is uncorrelated with every function of the measurements, so
-        M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2.  The right side never sees the error itself, so it is far less
-        noisy than the paired difference as long as the two filters are close.
+        M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2.  The right side never sees the error
+        itself, so it is far less noisy than the paired difference as long as the two filters are
+        close.
         """
         self._check_bound()
         return Estimate.jackknife(self._means("distance", name))
@@ -181,62 +203,84 @@ class Comparison:
 
         Without the exact AOF, how far above the control.  NaN at steps that are not `usable`.
 
-        A few trajectories carry a gap that has become small, and a sample may lack them.  Of variant 53, whose gaps fall below
-        a thousandth, the 95 % intervals of 20,000 trajectories hold the true gap in 85 % of the cases over all 51 steps, and in
-        half at the worst step; those of `mean_gap` in 97 %, of `difference` in 94 % (24 seeds, `benchmarks/intervals.py`).
+        A few trajectories carry a gap that has become small, and a sample may lack them.  Of
+        variant 53, whose gaps fall below a thousandth, the 95 % intervals of 20,000 trajectories
+        hold the true gap in 85 % of the cases over all 51 steps, and in half at the worst step;
+        those of `mean_gap` in 97 %, of `difference` in 94 % (24 seeds, `benchmarks/intervals.py`).
         """
         return Estimate.jackknife(self._gap(name))
 
     def gap_difference(self, first: str, second: str) -> Estimate:
-        """gap(first) - gap(second) per step, (steps,), paired: it tells which of two filters is the more accurate."""
+        """gap(first) - gap(second) per step, (steps,), paired: it tells which of two filters is the
+        more accurate."""
         return Estimate.jackknife(self._gap(first) - self._gap(second))
 
     def mean_gap(self, name: str, steps: slice = slice(None)) -> Estimate:
         """The mean over steps of `gap`: one number for a filter.
 
-        As all means over steps, over those that are `usable`; NaN if none is, but 0 if all errors are of rounding.
+        As all means over steps, over those that are `usable`; NaN if none is, but 0 if all errors
+        are of rounding.
         """
         reference = self._variance(self.reference)
         return self._mean(self._variance(name) - reference, reference, steps)
 
     def mean_gap_difference(self, first: str, second: str, steps: slice = slice(None)) -> Estimate:
         """mean_gap(first) - mean_gap(second), paired: the difference that a ranking turns on."""
-        return self._mean(self._variance(first) - self._variance(second), self._variance(self.reference), steps)
+        return self._mean(
+            self._variance(first) - self._variance(second), self._variance(self.reference), steps
+        )
 
     # --- who is better
 
     def ranking(self, steps: slice = slice(None)) -> list[tuple[str, Estimate]]:
-        """The entrants from the most accurate on, each with its `mean_gap`; those that coincide in their own order."""
+        """The entrants from the most accurate on, each with its `mean_gap`; those that coincide in
+        their own order."""
         gaps = [(name, self.mean_gap(name, steps)) for name in self.entrants]
         return sorted(gaps, key=lambda item: round(float(item[1].value) / ALIKE))
 
     @cached_property
     def _ranked(self) -> list[list[str]]:
-        """The entrants at each step from the most accurate on; those that coincide in their own order."""
+        """The entrants at each step from the most accurate on; those that coincide in their own
+        order."""
         variances = np.array([self._variance(name)[:, 0] for name in self.entrants])
         least = np.fmin.reduce(variances)
-        order = np.argsort(np.round(variances / np.where(least > 0, least, 1.0) / ALIKE), axis=0, kind="stable")
+        order = np.argsort(
+            np.round(variances / np.where(least > 0, least, 1.0) / ALIKE), axis=0, kind="stable"
+        )
         return [[self.entrants[i] for i in column] for column in order.T]
 
     def leaders(self, step: int, confidence: float = CONFIDENCE) -> list[str]:
-        """The most accurate entrant at a step, then those that are not significantly worse, each by its own paired interval."""
+        """The most accurate entrant at a step, then those that are not significantly worse, each by
+        its own paired interval."""
         best, *others = self._ranked[step]
-        return [best, *(name for name in others if self._p_value(name, best)[step] > 1 - confidence)]
+        return [
+            best,
+            *(name for name in others if self._p_value(name, best)[step] > 1 - confidence),
+        ]
 
     def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:
-        """For each step the most accurate entrant, who is not significantly worse, and who is the least accurate.
+        """For each step the most accurate entrant, who is not significantly worse, and who is the
+        least accurate.
 
-        With the confidence all of them are right: Holm's test of everybody's difference from the most accurate, over all steps
+        With the confidence all of them are right: Holm's test of everybody's difference from the
+        most accurate, over all steps
         and filters.  Where all errors are rounding, nobody is better.
         """
         ranked = self._ranked
         pairs = {(name, best) for best, *others in ranked for name in others}
         by_pair = {pair: self._p_value(*pair) for pair in pairs}
-        p = np.array([[by_pair[name, best][k] for name in others] for k, (best, *others) in enumerate(ranked)])
+        p = np.array(
+            [
+                [by_pair[name, best][k] for name in others]
+                for k, (best, *others) in enumerate(ranked)
+            ]
+        )
         worse = rejected(p, 1 - confidence)
         return [
             Verdict(
-                best, [name for name, bad in zip(others, row, strict=True) if not bad], others[-1] if others and row[-1] else ""
+                best,
+                [name for name, bad in zip(others, row, strict=True) if not bad],
+                others[-1] if others and row[-1] else "",
             )
             for (best, *others), row in zip(ranked, worse, strict=True)
         ]
@@ -258,14 +302,16 @@ class Comparison:
         return Estimate.jackknife(self._means("square", name))
 
     def own_variance(self, name: str) -> Estimate:
-        """What the filter claims: the mean of its own variances, summed over components, (steps,)."""
+        """What the filter claims: the mean of its own variances, summed over components,
+        (steps,)."""
         return Estimate.jackknife(self._means("own", name))
 
     def normalised_error(self, name: str) -> Estimate:
         """M[e^T p^-1 e] / n per step, (steps,): 1 for a filter whose covariance is right."""
         return Estimate.jackknife(self._means("normalised", name))
 
-    # --- what the estimates are made of: of all batches, and without each of them, (..., 1 + batches)
+    # --- what the estimates are made of: of all batches, and without each of them, (..., 1 +
+    # batches)
 
     def _means(self, kind: str, name: str) -> Array:
         if name not in self.names:
@@ -287,7 +333,8 @@ class Comparison:
         return ratio(self._variance(name) - reference, reference, np.nan)
 
     def _mean(self, numerator: Array, denominator: Array, steps: slice) -> Estimate:
-        """The mean over the usable ones of some steps of a quotient; ValueError if the steps are none."""
+        """The mean over the usable ones of some steps of a quotient; ValueError if the steps are
+        none."""
         chosen = np.zeros(self.steps, dtype=bool)
         chosen[steps] = True
         if not chosen.any():

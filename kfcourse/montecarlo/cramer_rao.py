@@ -1,15 +1,19 @@
 r"""The posterior Cramer-Rao bound: no estimate errs less, by what the densities' slopes tell.
 
-    M[(x_k - z_k)(x_k - z_k)^T] >= J_k^-1,  J_{k+1} = D22 - D12^T (J_k + D11)^-1 D12 + M[I_y(x_{k+1})],  J_0 = d^-1 + M[I_y(x_0)]
+    M[(x_k - z_k)(x_k - z_k)^T] >= J_k^-1,
+    J_{k+1} = D22 - D12^T (J_k + D11)^-1 D12 + M[I_y(x_{k+1})],
+    J_0 = d^-1 + M[I_y(x_0)]
 
 With normal laws x' | x ~ N(m(x), S(x)), and y | x likewise, the means over true trajectories are
 
     D11 = M[I_x(x)],    D12 = -M[m_x^T S^-1],    D22 = M[S^-1],
-    I_ij = m_i^T S^-1 m_j + 1/2 tr(S^-1 S_i S^-1 S_j)         (an index is a derivative by a component of x)
+    I_ij = m_i^T S^-1 m_j + 1/2 tr(S^-1 S_i S^-1 S_j)
+        (an index is a derivative by a component of x)
 
-The second term is what the size of the noise tells of x.  For a linear model with normal noises J^-1 is the Kalman filter's
-covariance; for others it lies below the exact filter's error, and it may be far below: J is a mean, and the few states at which
-the densities are sharp count in it most, while they hardly count in a mean square of errors.
+The second term is what the size of the noise tells of x.  For a linear model with normal noises
+J^-1 is the Kalman filter's covariance; for others it lies below the exact filter's error, and it
+may be far below: J is a mean, and the few states at which the densities are sharp count in it most,
+while they hardly count in a mean square of errors.
 
 Van Trees (1968); Tichavsky, Muravchik, Nehorai (1998).
 """
@@ -30,18 +34,21 @@ from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
-SHARE = 0.05  # of one trajectory in a mean of information: where it is more, the mean is infinite, or as good as
+# of one trajectory in a mean of information: where it is more, the mean is infinite, or as good as
+SHARE = 0.05
 
 
 def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
-    """J_k^-1, the covariances below which no filter's errors are, (steps, n, n); after y_k, as the filters' estimates.
+    """J_k^-1, the covariances below which no filter's errors are, (steps, n, n); after y_k, as the
+    filters' estimates.
 
     Its standard error is that of the means over trajectories, by the jackknife over batches.
 
     Parameters
     ----------
     model : Model
-        Both noises enter linearly; their covariances and the prior's are regular.  Angles count as numbers.
+        Both noises enter linearly; their covariances and the prior's are regular.  Angles count as
+        numbers.
     runs, steps : int
         Trajectories over which the means are taken.
     seed : int
@@ -49,25 +56,31 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
     Raises
     ------
     ModelError
-        A noise enters nonlinearly, or leaves a component without noise, or the prior has none there: no density then.
+        A noise enters nonlinearly, or leaves a component without noise, or the prior has none
+        there: no density then.
     ValueError
-        The information is infinite, as where a noise vanishes at a state or an equation jumps there: the bound is zero then,
-        and says nothing.
+        The information is infinite, as where a noise vanishes at a state or an equation jumps
+        there: the bound is zero then, and says nothing.
 
     Examples
     --------
     >>> from kfcourse import Model
     >>> from kfcourse.montecarlo.cramer_rao import posterior_bound
-    >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).value.ravel().round(4).tolist()
-    [0.8, 1.1671]
+    >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2,
+    seed=1).value.ravel().round(4).tolist() [0.8, 1.1671]
     """
     expect(model, Model, "posterior_bound")
     try:
         np.linalg.cholesky(model.prior.cov)
     except np.linalg.LinAlgError:
-        said = "the prior leaves a component, or a sum of some, without variance: there is no density, and no bound of this kind"
+        said = (
+            "the prior leaves a component, or a sum of some, without variance: there is no "
+            "density, and no bound of this kind"
+        )
         raise ModelError(said) from None
-    object_ = _information(model, model.difference_equation("this bound"), model.v, model.state_noise, "state")
+    object_ = _information(
+        model, model.difference_equation("this bound"), model.v, model.state_noise, "state"
+    )
     meter = _information(model, model.meter_equation, model.w, model.meter_noise, "meter")
     J = np.linalg.inv(model.prior.cov)
     bounds = []
@@ -77,49 +90,80 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
         bounds.append(np.linalg.inv(J))
         of_state, mixed, of_next = object_(x, k)
         D12 = -means_without_each(mixed)
-        J = _mean(of_next, "state", k) - transpose(D12) @ np.linalg.solve(J + _mean(of_state, "state", k), D12)
+        J = _mean(of_next, "state", k) - transpose(D12) @ np.linalg.solve(
+            J + _mean(of_state, "state", k), D12
+        )
     return Estimate.jackknife(np.moveaxis(symmetric(np.stack(bounds)), 1, -1))
 
 
 def _information(
     model: Model, equation: sp.MatrixBase, noise: Sequence[sp.Symbol], law: Gaussian, what: str
 ) -> Callable[[Array, int], tuple[Array, Array, Array]]:
-    """(x (runs, n), k) -> I (runs, n, n), m_x^T S^-1 (runs, n, r), S^-1 (runs, r, r) of what the equation makes of x."""
-    steps = [one for one in equation.atoms(sp.sign, sp.Heaviside, sp.floor) if one.has(*model.x, *noise)]
+    """(x (runs, n), k) -> I (runs, n, n), m_x^T S^-1 (runs, n, r), S^-1 (runs, r, r) of what the
+    equation makes of x."""
+    steps = [
+        one for one in equation.atoms(sp.sign, sp.Heaviside, sp.floor) if one.has(*model.x, *noise)
+    ]
     if steps or any(jumps(one, [*model.x, *noise]) for one in equation.atoms(sp.Piecewise)):
-        raise ValueError(_infinite(what, "it jumps, and a jump has no slope: slopes elsewhere do not tell of it"))
+        raise ValueError(
+            _infinite(what, "it jumps, and a jump has no slope: slopes elsewhere do not tell of it")
+        )
     slopes = equation.jacobian(sp.Matrix(noise))
     if slopes.has(*noise):
-        raise ModelError(f"a noise enters the {what} equation nonlinearly; the bound needs normal densities given the state")
+        raise ModelError(
+            f"a noise enters the {what} equation nonlinearly; the bound needs normal densities "
+            f"given the state"
+        )
     at_mean = dict(zip(noise, exact_matrix(law.mean), strict=True)) | model.values
     B = slopes.subs(model.values)
     S = (B * exact_matrix(law.cov) * B.T).applyfunc(sp.expand)
     if S.det().expand() == 0:
-        raise ModelError(f"the {what} equation leaves a component without noise: there is no density, and no bound of this kind")
+        raise ModelError(
+            f"the {what} equation leaves a component without noise: there is no density, and no "
+            f"bound of this kind"
+        )
     if model.n == 1 and isinstance(zeros := sp.solveset(S[0], model.x[0], sp.Reals), sp.FiniteSet):
-        raise ValueError(_infinite(what, f"its noise vanishes at {model.x[0]} = {', '.join(map(str, zeros))}"))
+        raise ValueError(
+            _infinite(what, f"its noise vanishes at {model.x[0]} = {', '.join(map(str, zeros))}")
+        )
     outputs = {"slope": equation.subs(at_mean).jacobian(sp.Matrix(model.x)), "S": S}
     outputs |= {f"S{i}": S.diff(x) for i, x in enumerate(model.x)}
-    functions = Stepwise.compile(model.known, f"{what}_information", {"x": sp.Matrix(model.x)}, outputs, ["x"])
+    functions = Stepwise.compile(
+        model.known, f"{what}_information", {"x": sp.Matrix(model.x)}, outputs, ["x"]
+    )
 
     def at(x: Array, k: int) -> tuple[Array, Array, Array]:
-        slope, S, *changes = (np.broadcast_to(one, (len(x), *one.shape[-2:])) for one in functions.at(k)(x))
+        slope, S, *changes = (
+            np.broadcast_to(one, (len(x), *one.shape[-2:])) for one in functions.at(k)(x)
+        )
         precision = np.linalg.inv(S)
         mixed = transpose(slope) @ precision
         relative = np.stack([precision @ change for change in changes], axis=1)  # (runs, n, r, r)
-        return mixed @ slope + 0.5 * np.einsum("aiuv,ajvu->aij", relative, relative), mixed, precision
+        return (
+            mixed @ slope + 0.5 * np.einsum("aiuv,ajvu->aij", relative, relative),
+            mixed,
+            precision,
+        )
 
     return at
 
 
 def _mean(information: Array, what: str, k: int) -> Array:
-    """Its means over the trajectories, (1 + batches, ...); ValueError if they are infinite, as far as these can tell."""
+    """Its means over the trajectories, (1 + batches, ...); ValueError if they are infinite, as far
+    as these can tell."""
     parts = np.diagonal(information, axis1=-2, axis2=-1)
     total = parts.sum(axis=0)
     if len(parts) > 1 and (parts.max(axis=0) > max(SHARE, 2 / len(parts)) * total).any():
-        raise ValueError(_infinite(what, f"at step {k} it hangs on one trajectory in {len(parts)}; or take more runs"))
+        raise ValueError(
+            _infinite(
+                what, f"at step {k} it hangs on one trajectory in {len(parts)}; or take more runs"
+            )
+        )
     return means_without_each(information)
 
 
 def _infinite(what: str, why: str) -> str:
-    return f"the {what} equation's information is infinite, and infinite information bounds no error ({why})"
+    return (
+        f"the {what} equation's information is infinite, and infinite information bounds no "
+        f"error ({why})"
+    )

@@ -1,7 +1,8 @@
 """Finding the coefficients of the designed filters (DUOF, FOS and their kin) over an ensemble.
 
-The equations of a step run until they ask for a regression; the ensemble answers it, and its coefficients are sent back
-into the equations.  Each design does so by itself, so that threads can share the designs.
+The equations of a step run until they ask for a regression; the ensemble answers it, and its
+coefficients are sent back into the equations.  Each design does so by itself, so that threads can
+share the designs.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
     TypeError, ValueError
         What is no design; a model with other numbers of states or measurements than the ensemble's.
     NotFinite
-        If a regression meets infinite or NaN values, or a filter a negative variance: the model or the filter diverges.
+        If a regression meets infinite or NaN values, or a filter a negative variance: the model or
+        the filter diverges.
     """
     for one in designs:
         expect(one, Design, "design")
@@ -69,23 +71,27 @@ def _check_sizes(designs: Sequence[Design], instant: Instant) -> None:
     for one in designs:
         if (one.model.n, one.model.p) != (n, p):
             raise ValueError(
-                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} "
+                f"measurements; "
                 f"the ensemble has {n} and {p}"
             )
 
 
 def _fitted(one: Design, state: State, instant: Instant, k: int) -> tuple[State, list[Affine]]:
-    """One step of a design: the next state, angles between -pi and pi, and the coefficients of its regressions."""
+    """One step of a design: the next state, angles between -pi and pi, and the coefficients of its
+    regressions."""
     fits = list[Affine]()
     equations = one.equations(state, instant.y)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
+    # what diverges is reported, by name
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         try:
             request = next(equations)
             while True:
                 moments = request.scatter(instant.x, instant.x_next, instant.mode)
                 if not moments.size:
                     raise NotFinite(
-                        f"step {k}: no trajectory of the design is in a mode that {one.name} fits; take more trajectories",
+                        f"step {k}: no trajectory of the design is in a mode that {one.name} "
+                        f"fits; take more trajectories",
                         one.name,
                     )
                 if not np.isfinite(moments.scatter).all():
@@ -100,6 +106,12 @@ def _fitted(one: Design, state: State, instant: Instant, k: int) -> tuple[State,
 
 def _diverged(name: str, instant: Instant, k: int) -> NotFinite:
     if not (np.isfinite(instant.x_next).all() and np.isfinite(instant.y).all()):
-        return NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
-    words = f"{name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
+        return NotFinite(
+            f"step {k}: the model's trajectories become infinite, check its equations and "
+            f"parameters"
+        )
+    words = (
+        f"{name}, step {k}: the design met infinite or NaN values; the model or this filter "
+        f"diverges"
+    )
     return NotFinite(words, name, "infinite", step=k)

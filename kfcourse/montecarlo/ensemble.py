@@ -1,7 +1,9 @@
-"""Trajectories of a model, drawn reproducibly: a seed stands for them, and they are generated whenever they are asked for.
+"""Trajectories of a model, drawn reproducibly: a seed stands for them, and they are generated
+whenever they are asked for.
 
-Initial states and every few steps draw from streams of their own, spawned from the seed.  So the numbers do not depend on
-who asks for them, or in which order.  They are equal to the last bit with the same kernels of linear algebra (BLAS).
+Initial states and every few steps draw from streams of their own, spawned from the seed.  So the
+numbers do not depend on who asks for them, or in which order.  They are equal to the last bit with
+the same kernels of linear algebra (BLAS).
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ class Instant(NamedTuple):
 
 
 class JumpTrajectories(NamedTuple):
-    """Stored trajectories of a model that jumps: x (steps, runs, n), y (steps, runs, p), modes (steps, runs)."""
+    """Stored trajectories of a model that jumps: x (steps, runs, n), y (steps, runs, p), modes
+    (steps, runs)."""
 
     x: Array
     y: Array
@@ -47,7 +50,8 @@ class JumpTrajectories(NamedTuple):
 
 @dataclass(frozen=True)
 class Ensemble:
-    """The trajectories that one seed stands for; an iteration over it gives an `Instant` for each step.
+    """The trajectories that one seed stands for; an iteration over it gives an `Instant` for each
+    step.
 
     Attributes
     ----------
@@ -88,20 +92,30 @@ def instants(
     start = _joined([_initial(model, *part, wide) for part in zip(sizes, seeds, strict=True)])
     for first in range(0, steps, STEPS_AT_ONCE):
         count, key = min(STEPS_AT_ONCE, steps - first), 1 + first // STEPS_AT_ONCE
-        parts = [_noises(model, _stream(seed, 0, key), count, size) for size, seed in zip(sizes, seeds, strict=True)]
+        parts = [
+            _noises(model, _stream(seed, 0, key), count, size)
+            for size, seed in zip(sizes, seeds, strict=True)
+        ]
         for k in range(count):
             noises = _joined([[kind[k] for kind in part] for part in parts])
             instant = advance(first + k, *start, *noises)
             yield instant
-            start = [instant.x_next] if instant.mode_next is None else [instant.x_next, instant.mode_next]
+            start = (
+                [instant.x_next]
+                if instant.mode_next is None
+                else [instant.x_next, instant.mode_next]
+            )
 
 
 @overload
 def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories: ...
 @overload
 def simulate(model: JumpModel, runs: int, steps: int, seed: int) -> JumpTrajectories: ...
-def simulate(model: Model | JumpModel, runs: int, steps: int, seed: int) -> Trajectories | JumpTrajectories:
-    """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed.
+def simulate(
+    model: Model | JumpModel, runs: int, steps: int, seed: int
+) -> Trajectories | JumpTrajectories:
+    """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same
+    seed.
 
     Of a model that jumps also its modes (steps, runs).
     """
@@ -113,7 +127,8 @@ def simulate(model: Model | JumpModel, runs: int, steps: int, seed: int) -> Traj
 
 
 def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:
-    """Prior over the law that `stratified` draws from, at initial states x (N, n): (N,), between 0 and 2.
+    """Prior over the law that `stratified` draws from, at initial states x (N, n): (N,), between 0
+    and 2.
 
     With t = (x - m)^T d^+ (x - m) and r the rank of d,
     2 N(x; m, d) / (N(x; m, d) + N(x; m, w^2 d)) = 2 / (1 + w^-r exp((1 - w^-2) t / 2)).
@@ -127,7 +142,8 @@ def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:
 
 
 def stratified(rng: np.random.Generator, runs: int, r: int, wide: float) -> Array:
-    """Standard normal states (runs, r), every second one `wide` times as wide, each half a Latin hypercube.
+    """Standard normal states (runs, r), every second one `wide` times as wide, each half a Latin
+    hypercube.
 
     Every component of a half has one value in each of as many strata of equal probability.
     """
@@ -158,7 +174,8 @@ def _moving(model: Model) -> Advance:
 
 
 def _jumping(model: JumpModel) -> Advance:
-    """One step of a model that jumps: (k, x, mode, v, w, u) -> y = b^mode(x, w), the next mode by u, x' = a^next(x, v)."""
+    """One step of a model that jumps: (k, x, mode, v, w, u) -> y = b^mode(x, w), the next mode by
+    u, x' = a^next(x, v)."""
     modes = [(mode, *compile_model(mode)) for mode in model.modes]
 
     def advance(k: int, x: Array, mode: Array, v: Array, w: Array, u: Array) -> Instant:
@@ -180,7 +197,9 @@ def _jumping(model: JumpModel) -> Advance:
 
 def _joined(parts: Sequence[Sequence[Array]]) -> list[Array]:
     """Arrays of several ensembles side by side, kind by kind."""
-    return [kind[0] if len(kind) == 1 else np.concatenate(kind) for kind in zip(*parts, strict=True)]
+    return [
+        kind[0] if len(kind) == 1 else np.concatenate(kind) for kind in zip(*parts, strict=True)
+    ]
 
 
 def _stream(seed: np.random.SeedSequence, *key: int) -> np.random.Generator:
@@ -188,7 +207,9 @@ def _stream(seed: np.random.SeedSequence, *key: int) -> np.random.Generator:
     return np.random.Generator(np.random.SFC64(spawned))
 
 
-def _initial(model: Model | JumpModel, size: int, seed: np.random.SeedSequence, wide: float | None) -> list[Array]:
+def _initial(
+    model: Model | JumpModel, size: int, seed: np.random.SeedSequence, wide: float | None
+) -> list[Array]:
     """Initial states (size, n), and modes if there are any; these from a stream of their own."""
     rng, prior = _stream(seed, 0, 0), model.prior
     r = len(prior.mean)
@@ -199,8 +220,11 @@ def _initial(model: Model | JumpModel, size: int, seed: np.random.SeedSequence, 
     return [x, _chosen(model.first[None], _stream(seed, 0, 0, 0).random(size))]
 
 
-def _noises(model: Model | JumpModel, rng: np.random.Generator, steps: int, size: int) -> list[Array]:
-    """Noises v and w of a few steps, (steps, size, r); of a model that jumps standard, and (steps, size) in 0 to 1."""
+def _noises(
+    model: Model | JumpModel, rng: np.random.Generator, steps: int, size: int
+) -> list[Array]:
+    """Noises v and w of a few steps, (steps, size, r); of a model that jumps standard, and (steps,
+    size) in 0 to 1."""
     if isinstance(model, JumpModel):
         noises = (model.modes[0].v, model.modes[0].w)
         drawn = [rng.standard_normal((steps, len(one), size)).swapaxes(1, 2) for one in noises]
@@ -209,7 +233,8 @@ def _noises(model: Model | JumpModel, rng: np.random.Generator, steps: int, size
 
 
 def _chosen(probabilities: Array, u: Array) -> Array:
-    """A number for each of u (N,), between 0 and 1: j with the probability of column j, (N, J) or (1, J)."""
+    """A number for each of u (N,), between 0 and 1: j with the probability of column j, (N, J) or
+    (1, J)."""
     return (u[:, None] >= np.cumsum(probabilities, axis=1)[:, :-1]).sum(axis=1).astype(np.int8)
 
 

@@ -4,8 +4,8 @@
 
     compare(filters, model, runs, steps, seed) -> Comparison
 
-designs the filters that need it on an ensemble of their own, runs all of them on the same trajectories, and keeps sums over
-batches of these, never the trajectories themselves.
+designs the filters that need it on an ensemble of their own, runs all of them on the same
+trajectories, and keeps sums over batches of these, never the trajectories themselves.
 """
 
 from __future__ import annotations
@@ -36,8 +36,10 @@ from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
-PIECE = 2500  # trajectories of a piece of work: a pass over fewer takes as long as the interpreter does
-DESIGN_RUNS = 200_000  # coefficients of so many cost a filter some hundred-thousandth of its accuracy
+# trajectories of a piece of work: a pass over fewer takes as long as the interpreter does
+PIECE = 2500
+# coefficients of so many cost a filter some hundred-thousandth of its accuracy
+DESIGN_RUNS = 200_000
 
 WIDE = 1.5  # times as wide as the prior: a law from which half of the initial states are drawn
 
@@ -51,7 +53,8 @@ def run(one: Filter, y: Array) -> Gaussian:
     ----------
     one : Filter
     y : ndarray (steps, runs, p)
-        NaN where a measurement is missing.  One trajectory of a scalar meter may come as (steps,), and counts as runs = 1.
+        NaN where a measurement is missing.  One trajectory of a scalar meter may come as (steps,),
+        and counts as runs = 1.
 
     Returns
     -------
@@ -63,13 +66,15 @@ def run(one: Filter, y: Array) -> Gaussian:
     ValueError
         Measurements of another shape, none at all, or infinite ones.
     TypeError
-        No filter: a `Design`, whose coefficients are still to be found, a model, or structural functions.
+        No filter: a `Design`, whose coefficients are still to be found, a model, or structural
+        functions.
     """
     return stacked([state.posterior for state in islice(walk(one, y), 1, None)])
 
 
 def predictions(one: Filter, y: Array) -> Gaussian:
-    """What a filter expects before each measurement: lambda_k (steps, runs, n) and Psi_k (steps, runs, n, n).
+    """What a filter expects before each measurement: lambda_k (steps, runs, n) and Psi_k (steps,
+    runs, n, n).
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
@@ -77,12 +82,14 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
 
 def states(one: Filter, y: Array) -> list[State]:
-    """The filter's states: before the first measurement, and after each.  Arguments and errors as of `run`."""
+    """The filter's states: before the first measurement, and after each.  Arguments and errors as
+    of `run`."""
     return list(walk(one, y))
 
 
 def walk(one: Filter, y: Array) -> Iterator[State]:
-    """The same one after the other: what the exact filter or particles remember of all steps may be gigabytes."""
+    """The same one after the other: what the exact filter or particles remember of all steps may be
+    gigabytes."""
     y = measurements(one, y)
     return accumulate(y, one.step, initial=one.init(y.shape[1]))
 
@@ -94,14 +101,20 @@ def measurements(one: Filter, y: Array) -> Array:
     if y.ndim == 1 and p == 1:
         y = y[:, None, None]
     if y.ndim != 3:
-        raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
+        raise ValueError(
+            f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}"
+        )
     if y.shape[2] != p:
         raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
     if not y.size:
-        raise ValueError(f"there are no measurements to run over: the shape (steps, runs, {p}) is {y.shape}")
+        raise ValueError(
+            f"there are no measurements to run over: the shape (steps, runs, {p}) is {y.shape}"
+        )
     if (endless := np.isinf(y)).any():
         k, run, _ = np.argwhere(endless)[0]
-        raise ValueError(f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing")
+        raise ValueError(
+            f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing"
+        )
     warn_of_degrees("a measurement", y, one.model.measured, one.model.angles.y)
     return y
 
@@ -110,7 +123,9 @@ def _reshaped(y: Array, p: int) -> str:
     """How measurements of two axes may be meant."""
     if y.ndim != 2:
         return ""
-    ways = ["y[:, None, :] if the columns are components of one trajectory"] if y.shape[1] == p else []
+    ways = (
+        ["y[:, None, :] if the columns are components of one trajectory"] if y.shape[1] == p else []
+    )
     ways += ["y[:, :, None] if they are trajectories"] if p == 1 else []
     return ": give " + " or ".join(ways) if ways else ""
 
@@ -134,26 +149,29 @@ def compare(
     Parameters
     ----------
     filters : sequence of Filter or Design
-        Designs are designed first, on an ensemble of their own; standard errors hold for the filters as they were designed.
-        One that cannot go on (the exact one, particles) is left out, and `Comparison.left_out` tells why.
+        Designs are designed first, on an ensemble of their own; standard errors hold for the
+        filters as they were designed. One that cannot go on (the exact one, particles) is left out,
+        and `Comparison.left_out` tells why.
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
     seed : int
-        The same seed gives the same numbers, bit by bit, whatever the number of jobs.  Another processor rounds otherwise, and
-        so does a process that compiles the exact filter for the first time: up to some 1e-12.
+        The same seed gives the same numbers, bit by bit, whatever the number of jobs.  Another
+        processor rounds otherwise, and so does a process that compiles the exact filter for the
+        first time: up to some 1e-12.
     design_runs : int, optional
         Size of the design ensemble; by default ten times `runs`, at most 200,000.
     same_ensemble : bool
-        Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
-        filters, by about the number of coefficients over `runs`.
+        Design on the very trajectories of the comparison, as the lab does: optimistic for the
+        designed filters, by about the number of coefficients over `runs`.
     smoothers : sequence of Filter
-        Filters that look back from the end of each record, such as `aof(gaussian(model))`, and `pointmass(model)` as their bound;
-        `Comparison.smoothing` tells how good they are.
+        Filters that look back from the end of each record, such as `aof(gaussian(model))`, and
+        `pointmass(model)` as their bound; `Comparison.smoothing` tells how good they are.
     jobs : int, optional
         How many threads share the work, by default one for each processor core.
     dask : str, optional
-        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters; the numbers are the same but
+        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters;
+        the numbers are the same but
         for rounding.  Designed is here.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
@@ -187,10 +205,13 @@ def compare(
         except NotFinite:
             if sample.wide is None:
                 raise
-            sample = sample._replace(wide=None)  # some far start is too far: none but the prior's own
+            # some far start is too far: none but the prior's own
+            sample = sample._replace(wide=None)
             result = _compared(ready, sample, seed, jobs, progress)
         if not same_ensemble:
-            result = replace(result, designed=tuple(one.name for one in filters if isinstance(one, Design)))
+            result = replace(
+                result, designed=tuple(one.name for one in filters if isinstance(one, Design))
+            )
         if smoothers:
             looking_back = _compared(smoothers, sample, seed, jobs, progress, back=True)
             result = replace(result, smoothing=looking_back)
@@ -198,7 +219,8 @@ def compare(
 
 
 def width(model: Model | JumpModel) -> float | None:
-    """How much wider half of the initial states are drawn: not at all where they are angles, or where nothing is drawn."""
+    """How much wider half of the initial states are drawn: not at all where they are angles, or
+    where nothing is drawn."""
     return WIDE if not model.angles.x and np.any(model.prior.cov) else None
 
 
@@ -208,11 +230,16 @@ def batch_sizes(runs: int) -> list[int]:
 
 
 def without_failing(
-    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, Reason] | None = None, **options: Any
+    filters: Sequence[Filter | Design],
+    *common: Any,
+    left_out: Mapping[str, Reason] | None = None,
+    **options: Any,
 ) -> Comparison:
-    """`compare` of the filters that do not fail; the others are named in `left_out`, beside those given.
+    """`compare` of the filters that do not fail; the others are named in `left_out`, beside those
+    given.
 
-    A filter that leaves the finite numbers is taken out, and the comparison starts again.  Other arguments as of `compare`.
+    A filter that leaves the finite numbers is taken out, and the comparison starts again.  Other
+    arguments as of `compare`.
 
     Raises
     ------
@@ -246,7 +273,8 @@ class Sample(NamedTuple):
         return self._replace(sizes=self.sizes[batches], seeds=self.seeds[batches])
 
     def begun(self, one: Filter) -> State:
-        """A filter's state before the first measurement; what draws random numbers draws others for each sample."""
+        """A filter's state before the first measurement; what draws random numbers draws others for
+        each sample."""
         state = one.init(sum(self.sizes))
         if not hasattr(state.memory, "part"):
             return state
@@ -300,11 +328,14 @@ def _compared(
         else:
             names = tuple(one.name for one in running)
             runs = sum(sample.sizes)
-            return Comparison(sample.model, names, runs, sample.steps, seed, sums, left_out=left_out)
+            return Comparison(
+                sample.model, names, runs, sample.steps, seed, sums, left_out=left_out
+            )
 
 
 class LeftOut(Exception):
-    """A filter that cannot go on, as it is slow or says so itself, and that the others do without."""
+    """A filter that cannot go on, as it is slow or says so itself, and that the others do
+    without."""
 
     def __init__(self, filter_name: str, reason: Reason):
         super().__init__(filter_name, reason)
@@ -312,12 +343,14 @@ class LeftOut(Exception):
 
 
 def run_batches(filters: Sequence[Filter], sample: Sample, *, back: bool = False) -> Sums:
-    """Advance all filters together over the steps of a sample; `back`: let them look back from its end."""
+    """Advance all filters together over the steps of a sample; `back`: let them look back from its
+    end."""
     starts = np.concatenate([[0], np.cumsum(sample.sizes[:-1])]).astype(int)
     sums = Sums.empty(len(filters), sample.steps, sample.model.n, len(sample.sizes))
     exact = next((i for i, one in enumerate(filters) if one.name == EXACT), None)
     angles = sample.model.angles.x
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
+    # what diverges is reported below, by name
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for k, (instant, laws) in enumerate((_back if back else _onward)(filters, sample)):
             if k == 0:
                 weight = weights(sample.model.prior, instant.x, sample.wide)
@@ -362,10 +395,11 @@ def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, 
 
 
 def _twice(state: State) -> tuple[Array, Array, Array]:
-    """Two estimates of the exact filter whose errors, if it has any, are independent, and its own error (runs,).
+    """Two estimates of the exact filter whose errors, if it has any, are independent, and its own
+    error (runs,).
 
-    Those of both clouds of particles, and half their distance: a product of distances from them then does not hold their errors.
-    Of point masses twice the same, and what discretisation leaves.
+    Those of both clouds of particles, and half their distance: a product of distances from them
+    then does not hold their errors. Of point masses twice the same, and what discretisation leaves.
     """
     mean = state.posterior.mean
     return *getattr(state.memory, "halves", (mean, mean)), state.memory.discretisation_error()
@@ -391,34 +425,53 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     step = int(np.argmin(finite.all(axis=0)))
     if not finite[:, step].any():
         raise NotFinite(
-            f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
+            f"step {step}: every filter fails; the model's trajectories become infinite, check "
+            f"its equations and parameters"
         )
     one = filters[int(np.argmin(finite[:, step]))]
     words = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
         raise LeftOut(one.name, NotFinite(words, one.name, "infinite", step=step))
-    raise NotFinite(f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step)
+    raise NotFinite(
+        f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step
+    )
 
 
-def _progress(what: str, total: int, unit: str, progress: bool | None, items: Iterable[T]) -> Iterable[T]:
+def _progress(
+    what: str, total: int, unit: str, progress: bool | None, items: Iterable[T]
+) -> Iterable[T]:
     """The items, with a progress bar."""
     # tqdm: disable=None means "unless standard error is a terminal"
-    return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)
+    return tqdm(
+        items,
+        desc=what,
+        total=total,
+        unit=unit,
+        disable=None if progress is None else not progress,
+        delay=0.5,
+    )
 
 
 def _check_arguments(filters: Sequence[Filter | Design], model: Model | JumpModel) -> None:
     """TypeError or ValueError for what `compare` cannot do with these arguments."""
     if isinstance(filters, Filter | Design):
-        raise TypeError(f"compare expects a list of filters, and one came: compare([{filters.name}], model, ...)")
+        raise TypeError(
+            f"compare expects a list of filters, and one came: compare([{filters.name}], model, "
+            f"...)"
+        )
     for one in filters:
         expect(one, Filter, "compare", Design)
     expect(model, Model, "compare", JumpModel)
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
-        raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
+        raise ValueError(
+            f"give at least one filter, and each a name of its own: "
+            f"{', '.join(names) or 'none given'}"
+        )
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(
-                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} "
+                f"measurements; "
                 f"this one has {model.n} and {model.p}"
             )

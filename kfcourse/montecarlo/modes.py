@@ -1,4 +1,5 @@
-"""How well filters know the mode of a model that jumps: the share of steps at which the likeliest mode is the true one."""
+"""How well filters know the mode of a model that jumps: the share of steps at which the likeliest
+mode is the true one."""
 
 from __future__ import annotations
 
@@ -22,10 +23,11 @@ class Recognised(NamedTuple):
     Attributes
     ----------
     share : dict
-        Name of a filter to the share of steps with the right mode, the mean over all steps and trajectories.
+        Name of a filter to the share of steps with the right mode, the mean over all steps and
+        trajectories.
     guess : float
-        The same for who always names the mode that is likeliest before anything is measured; where transitions depend on the
-        state, the most frequent one.
+        The same for who always names the mode that is likeliest before anything is measured; where
+        transitions depend on the state, the most frequent one.
     mode : ndarray (steps,)
         The true modes of one trajectory: the first in which there are as many as in any.
     probability : dict
@@ -38,8 +40,11 @@ class Recognised(NamedTuple):
     probability: dict[str, Array]
 
 
-def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: int, seed: int) -> Recognised:
-    """Run the filters that carry probabilities of modes on common trajectories; slow ones on an eighth of them.
+def recognised(
+    filters: Sequence[Filter], model: JumpModel, runs: int, steps: int, seed: int
+) -> Recognised:
+    """Run the filters that carry probabilities of modes on common trajectories; slow ones on an
+    eighth of them.
 
     The standard errors are those of means over independent trajectories.
     """
@@ -59,6 +64,8 @@ def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: in
         each = right / steps
         share[one.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
         there[one.name] = np.array(probabilities)
-    likeliest = [(np.bincount(mode[k]) if model.by_state else model.law_at(k)).argmax() for k in range(steps)]
+    likeliest = [
+        (np.bincount(mode[k]) if model.by_state else model.law_at(k)).argmax() for k in range(steps)
+    ]
     guess = np.mean([(mode[k] == one).mean() for k, one in enumerate(likeliest)])
     return Recognised(share, float(guess), mode[:, shown], there)

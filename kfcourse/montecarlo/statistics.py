@@ -1,8 +1,10 @@
-"""Means over batches of trajectories, and estimates made of them, with standard errors that respect pairing.
+"""Means over batches of trajectories, and estimates made of them, with standard errors that respect
+pairing.
 
-The trajectories are cut into batches.  What is kept is the sum over each batch.  Every statistic is a function of means; it is
-computed from all batches, and again without each of them, and the scatter of these values tells its standard error (the
-jackknife; M. Quenouille 1956, J. Tukey 1958).  So differences, ratios and means over steps need no formula of their own.
+The trajectories are cut into batches.  What is kept is the sum over each batch.  Every statistic is
+a function of means; it is computed from all batches, and again without each of them, and the
+scatter of these values tells its standard error (the jackknife; M. Quenouille 1956, J. Tukey 1958).
+So differences, ratios and means over steps need no formula of their own.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ class Estimate:
 
     @classmethod
     def jackknife(cls, replicates: Array) -> Estimate:
-        """From a statistic of all batches and without each of them, (..., 1 + batches); NaN without a second batch.
+        """From a statistic of all batches and without each of them, (..., 1 + batches); NaN without
+        a second batch.
 
         SE^2 = (B - 1) / B sum_b (s_-b - mean s)^2
         """
@@ -43,7 +46,8 @@ class Estimate:
         batches = without.shape[-1]
         if batches < 2:
             return cls(replicates[..., 0], np.full(replicates.shape[:-1], np.nan), 1)
-        with np.errstate(invalid="ignore"):  # an infinite mean (a filter that claims variance 0) has no standard error
+        # an infinite mean (a filter that claims variance 0) has no standard error
+        with np.errstate(invalid="ignore"):
             scatter = without.var(axis=-1) * (batches - 1)
         return cls(replicates[..., 0], np.sqrt(scatter), batches - 1)
 
@@ -56,7 +60,9 @@ class Estimate:
         """Half the length of the interval."""
         if not 0 < confidence < 1:
             raise ValueError(f"a confidence lies between 0 and 1, got {confidence}")
-        return np.asarray(scipy.special.stdtrit(self.freedom, 0.5 + confidence / 2) * self.standard_error)
+        return np.asarray(
+            scipy.special.stdtrit(self.freedom, 0.5 + confidence / 2) * self.standard_error
+        )
 
     def p_value(self) -> Array:
         """Probability of a value at least so far from 0, to either side, if the true one were 0.
@@ -66,7 +72,9 @@ class Estimate:
         with np.errstate(divide="ignore", invalid="ignore"):
             t = self.value / self.standard_error
         certain = np.where(self.value == 0, 1.0, 0.0)
-        return np.where(self.standard_error == 0, certain, 2 * scipy.special.stdtr(self.freedom, -np.abs(t)))
+        return np.where(
+            self.standard_error == 0, certain, 2 * scipy.special.stdtr(self.freedom, -np.abs(t))
+        )
 
     def __iter__(self) -> Iterator[Estimate]:
         """Along the first axis: the steps, one after the other."""
@@ -77,10 +85,12 @@ class Estimate:
 
 
 def rejected(p: Array, level: float) -> Array:
-    """Holm's test of many hypotheses: which (any shape) are rejected so that all rejections are right with probability 1 - level.
+    """Holm's test of many hypotheses: which (any shape) are rejected so that all rejections are
+    right with probability 1 - level.
 
-    The smallest p is compared with level / n, the next with level / (n - 1), ... until one is larger (S. Holm, A simple
-    sequentially rejective multiple test procedure, Scand. J. Stat. 6, 1979).
+    The smallest p is compared with level / n, the next with level / (n - 1), ... until one is
+    larger (S. Holm, A simple sequentially rejective multiple test procedure, Scand. J. Stat. 6,
+    1979).
     """
     order = np.argsort(p, axis=None)
     small = p.ravel()[order] <= level / np.arange(p.size, 0, -1)
@@ -92,7 +102,12 @@ def rejected(p: Array, level: float) -> Array:
 def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array:
     """numerator / denominator, and `of_zero` where the denominator is not positive."""
     shape = np.broadcast_shapes(np.shape(numerator), np.shape(denominator))
-    return np.divide(numerator, denominator, out=np.broadcast_to(of_zero, shape).astype(float), where=denominator > 0)
+    return np.divide(
+        numerator,
+        denominator,
+        out=np.broadcast_to(of_zero, shape).astype(float),
+        where=denominator > 0,
+    )
 
 
 class Sums(NamedTuple):
@@ -138,8 +153,11 @@ class Sums(NamedTuple):
         """Sums over the batches of all parts."""
         return cls(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
 
-    def record(self, i: int, k: int, x: Array, estimate: Gaussian, weight: Array, starts: Array) -> None:
-        """Add step k of filter i: true states x (N, n), its estimate, the weights (N,), and where the batches start."""
+    def record(
+        self, i: int, k: int, x: Array, estimate: Gaussian, weight: Array, starts: Array
+    ) -> None:
+        """Add step k of filter i: true states x (N, n), its estimate, the weights (N,), and where
+        the batches start."""
         mean, cov = estimate
         error, n = x - mean, x.shape[1]
         square = error * error
@@ -161,10 +179,13 @@ class Sums(NamedTuple):
 
 
 def means_without_each(values: Array) -> Array:
-    """Means of values (runs, ...) over all trajectories, and without each of the batches: (1 + batches, ...)."""
+    """Means of values (runs, ...) over all trajectories, and without each of the batches: (1 +
+    batches, ...)."""
     starts = np.linspace(0, len(values), min(BATCHES, len(values)) + 1).astype(int)
     sums = np.add.reduceat(values, starts[:-1], axis=0)
-    return np.moveaxis(_without_each(np.moveaxis(sums, 0, -1)) / _without_each(np.diff(starts)), -1, 0)
+    return np.moveaxis(
+        _without_each(np.moveaxis(sums, 0, -1)) / _without_each(np.diff(starts)), -1, 0
+    )
 
 
 def _without_each(sums: Array) -> Array:

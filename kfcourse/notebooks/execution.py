@@ -25,7 +25,8 @@ from kfcourse.checks.question import MIME
 from kfcourse.notebooks.grading import submissions
 from kfcourse.symbolic.markup import mathml as formula
 
-SECONDS = 5 * submissions.SECONDS  # a cell may take: what needs a student's minute alone shares a busy machine here
+# a cell may take: what needs a student's minute alone shares a busy machine here
+SECONDS = 5 * submissions.SECONDS
 PRINTING = 120  # seconds until a page is printed
 BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
 
@@ -33,13 +34,15 @@ BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
 class _Client(NotebookClient):
     """Leaves signals to the command.
 
-    The client's own handlers end the kernel and nothing else: the next notebook would go on after Ctrl-C.
+    The client's own handlers end the kernel and nothing else: the next notebook would go on after
+    Ctrl-C.
     """
 
     @asynccontextmanager
     async def async_setup_kernel(self, **kwargs: Any) -> AsyncIterator[None]:
         loop = asyncio.get_running_loop()
-        with mock.patch.object(loop, "add_signal_handler", side_effect=RuntimeError):  # as outside of the main thread
+        # as outside of the main thread
+        with mock.patch.object(loop, "add_signal_handler", side_effect=RuntimeError):
             async with super().async_setup_kernel(**kwargs):
                 yield
 
@@ -81,11 +84,17 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         try:
             client.execute()
         except CellExecutionError as error:
-            raise NotebookFailed(f"{name}, cell {started[-1]}: {error.ename}: {error.evalue}") from None
+            raise NotebookFailed(
+                f"{name}, cell {started[-1]}: {error.ename}: {error.evalue}"
+            ) from None
         except CellTimeoutError:
-            raise NotebookFailed(f"{name}, cell {started[-1]}: still running after {SECONDS:g} s") from None
+            raise NotebookFailed(
+                f"{name}, cell {started[-1]}: still running after {SECONDS:g} s"
+            ) from None
         except DeadKernelError:
-            raise NotebookFailed(f"{name}, cell {started[-1]}: the kernel died (out of memory?)") from None
+            raise NotebookFailed(
+                f"{name}, cell {started[-1]}: the kernel died (out of memory?)"
+            ) from None
     if stop_at_error and (failure := first_error(result)):
         cell, shown = failure
         raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
@@ -118,12 +127,19 @@ def pictures(executed: NotebookNode) -> dict[str, bytes]:
 
 
 def results(executed: NotebookNode) -> list[dict[str, Any]]:
-    """What the checks of an executed notebook found: dicts with question, status, diagnosis and message."""
-    return [output.data[MIME] for cell in executed.cells for output in cell.get("outputs", []) if MIME in output.get("data", {})]
+    """What the checks of an executed notebook found: dicts with question, status, diagnosis and
+    message."""
+    return [
+        output.data[MIME]
+        for cell in executed.cells
+        for output in cell.get("outputs", [])
+        if MIME in output.get("data", {})
+    ]
 
 
 def html(executed: NotebookNode, title: str) -> str:
-    """The executed notebook as one page that needs no network: formulas as MathML, pictures inside."""
+    """The executed notebook as one page that needs no network: formulas as MathML, pictures
+    inside."""
     copy = nbformat.from_dict(executed)
     for cell in copy.cells:
         if cell.cell_type == "markdown":
@@ -135,8 +151,12 @@ def html(executed: NotebookNode, title: str) -> str:
             if "text/markdown" in data:
                 data["text/markdown"] = mathml(data["text/markdown"])
     body, resources = HTMLExporter(template_name="basic").from_notebook_node(copy)
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse.notebooks"), autoescape=True)
-    return environment.get_template("notebook.html.j2").render(title=title, body=body, colours=resources["inlining"]["css"][-1])
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("kfcourse.notebooks"), autoescape=True
+    )
+    return environment.get_template("notebook.html.j2").render(
+        title=title, body=body, colours=resources["inlining"]["css"][-1]
+    )
 
 
 def mathml(text: str) -> str:
@@ -163,12 +183,25 @@ def pdf(page: Path, target: Path) -> None:
     """
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
-        raise NotebookFailed(f"no browser to print PDF with; install one of {', '.join(BROWSERS[:3])}, or print {page} yourself")
+        raise NotebookFailed(
+            f"no browser to print PDF with; install one of {', '.join(BROWSERS[:3])}, or print "
+            f"{page} yourself"
+        )
     with tempfile.TemporaryDirectory() as profile:
-        command = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", "--no-pdf-header-footer"]
+        command = [
+            browser,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            f"--user-data-dir={profile}",
+            "--no-pdf-header-footer",
+        ]
         try:
             done = subprocess.run(
-                [*command, f"--print-to-pdf={target}", page.resolve().as_uri()], capture_output=True, text=True, timeout=PRINTING
+                [*command, f"--print-to-pdf={target}", page.resolve().as_uri()],
+                capture_output=True,
+                text=True,
+                timeout=PRINTING,
             )
         except subprocess.TimeoutExpired:
             raise NotebookFailed(f"{browser} did not print {page} in {PRINTING} s") from None

@@ -1,4 +1,5 @@
-"""Making a course's notebooks: which ones are wanted, and a line on the screen when a folder is done."""
+"""Making a course's notebooks: which ones are wanted, and a line on the screen when a folder is
+done."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def hand_out(
     workers: int,
     with_pdf: bool = False,
 ) -> bool:
-    """Write the notebooks that `kfcourse exercises` or `solutions` is asked for; whether all could be made."""
+    """Write the notebooks that `kfcourse exercises` or `solutions` is asked for; whether all could
+    be made."""
     wanted = _letters(letters)
     faults: dict[str, VariantError] = {}
     if everything:
@@ -62,8 +64,15 @@ def hand_out(
 
 def _say_left_out(variants_file: Path, others: bool) -> None:
     """Name the file's variants with modes, which nobody gets; ValueError if there are no others."""
-    jumping = [name for name, one in read_variants(variants_file)[0].items() if isinstance(one.model, JumpModel)]
-    reason = f"jump between modes, for which the exercises are not made: {clean(', '.join(jumping), 500)}"
+    jumping = [
+        name
+        for name, one in read_variants(variants_file)[0].items()
+        if isinstance(one.model, JumpModel)
+    ]
+    reason = (
+        f"jump between modes, for which the exercises are not made: "
+        f"{clean(', '.join(jumping), 500)}"
+    )
     if not others:
         raise ValueError(f"{variants_file} has no other variants than those that {reason}")
     if jumping:
@@ -71,39 +80,64 @@ def _say_left_out(variants_file: Path, others: bool) -> None:
 
 
 def _letters(given: str | None) -> list[str]:
-    letters = list(sets()) if given is None else [letter.strip() for letter in given.split(",") if letter.strip()]
+    letters = (
+        list(sets())
+        if given is None
+        else [letter.strip() for letter in given.split(",") if letter.strip()]
+    )
     unknown = [letter for letter in letters if letter not in sets()]
     if unknown or not letters:
-        raise click.UsageError(f"no exercise set {', '.join(unknown) or given}; there are {', '.join(sets())}")
+        raise click.UsageError(
+            f"no exercise set {', '.join(unknown) or given}; there are {', '.join(sets())}"
+        )
     return letters
 
 
 def _for_students(
-    kind: str, students: Path, variants: Sequence[str], letters: Sequence[str], out: Path, options: Mapping[str, Any]
+    kind: str,
+    students: Path,
+    variants: Sequence[str],
+    letters: Sequence[str],
+    out: Path,
+    options: Mapping[str, Any],
 ) -> list[Job]:
-    """A folder for each student, out/group/name, with their variant's notebooks; the assignment is printed."""
+    """A folder for each student, out/group/name, with their variant's notebooks; the assignment is
+    printed."""
     given = assign(students, variants)
     click.echo("group       variant   name")
     for student in given:
         click.echo(f"{student.group:<11} {clean(student.variant):<9} {student.name}")
     if kind == "exercises":
         out.mkdir(parents=True, exist_ok=True)
-        save_assignment([replace(student, sets=" ".join(letters)) for student in given], out / ASSIGNMENT)
+        save_assignment(
+            [replace(student, sets=" ".join(letters)) for student in given], out / ASSIGNMENT
+        )
         click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
     return [
-        Job(letter, student.variant, out / student.folder, kind, student=f"{student.name}, {student.group}", **options)
+        Job(
+            letter,
+            student.variant,
+            out / student.folder,
+            kind,
+            student=f"{student.name}, {student.group}",
+            **options,
+        )
         for student in given
         for letter in letters
     ]
 
 
 def _separate(work: Sequence[Job]) -> None:
-    """ValueError if two jobs would write the same file; some file systems take large and small letters for the same."""
+    """ValueError if two jobs would write the same file; some file systems take large and small
+    letters for the same."""
     seen: dict[str, Job] = {}
     for job in work:
         other = seen.setdefault(str(job.target).casefold(), job)
         if other is not job:
-            raise ValueError(f"two notebooks would be {job.target}: of {other.name} and of {job.name}; change one of the names")
+            raise ValueError(
+                f"two notebooks would be {job.target}: of {other.name} and of {job.name}; change "
+                f"one of the names"
+            )
 
 
 def _show(outcomes: Iterable[Outcome], work: Sequence[Job]) -> list[Outcome]:
@@ -118,7 +152,9 @@ def _show(outcomes: Iterable[Outcome], work: Sequence[Job]) -> list[Outcome]:
         count[folder][outcome.status] += 1
         failed += [outcome] * (outcome.status == "failed")
         if not left[folder]:
-            written, old, wrong = (count[folder][status] for status in ("written", "up to date", "failed"))
+            written, old, wrong = (
+                count[folder][status] for status in ("written", "up to date", "failed")
+            )
             with tqdm.external_write_mode():  # the progress bar stands aside
                 click.echo(f"{_relative(folder):<28} {written:>7} {old:>11} {wrong:>7}")
     return failed

@@ -1,7 +1,9 @@
-"""A course's notebooks: every set for every variant, made in parallel, resumed where it was interrupted.
+"""A course's notebooks: every set for every variant, made in parallel, resumed where it was
+interrupted.
 
-A job is one set for one variant.  It executes the worked solution once; from it come the solution's notebook and page, and the
-student's notebook with the pictures to reach.  Files appear complete or not at all.
+A job is one set for one variant.  It executes the worked solution once; from it come the solution's
+notebook and page, and the student's notebook with the pictures to reach.  Files appear complete or
+not at all.
 """
 
 from __future__ import annotations
@@ -58,7 +60,8 @@ class Job:
     student: str = ""
 
     def __post_init__(self) -> None:
-        for path in ("folder", "variants_file", "masters"):  # a worker process may have another working directory
+        # a worker process may have another working directory
+        for path in ("folder", "variants_file", "masters"):
             if getattr(self, path) is not None:
                 object.__setattr__(self, path, getattr(self, path).absolute())
 
@@ -91,13 +94,20 @@ def make(job: Job) -> Outcome:
             notebook.metadata["kfcourse"]["student"] = job.student
         wanted = [job.target]
         if job.kind == "solutions":
-            wanted += [job.target.with_suffix(".html"), *([job.target.with_suffix(".pdf")] if job.with_pdf else [])]
+            wanted += [
+                job.target.with_suffix(".html"),
+                *([job.target.with_suffix(".pdf")] if job.with_pdf else []),
+            ]
         if _up_to_date(job.target, notebook) and all(path.exists() for path in wanted):
             return Outcome(job, "up to date")
         executed = execute(solution(notebook), job.name)
         wrong = [result for result in results(executed) if result["status"] != PASSED]
         if wrong:
-            return Outcome(job, "failed", f"the solution does not pass {wrong[0]['question']}: {wrong[0]['message']}")
+            return Outcome(
+                job,
+                "failed",
+                f"the solution does not pass {wrong[0]['question']}: {wrong[0]['message']}",
+            )
         _write(job, notebook, executed)
     except (NotebookFailed, ValueError, OSError) as error:
         return Outcome(job, "failed", str(error).removeprefix(f"{job.name}, "))
@@ -136,12 +146,15 @@ def fingerprint(notebook: NotebookNode) -> str:
 def _up_to_date(path: Path, notebook: NotebookNode) -> bool:
     try:
         old = json.loads(path.read_bytes())["metadata"]["kfcourse"]["fingerprint"]
-    except (OSError, ValueError, RecursionError, LookupError, TypeError):  # missing, or not a notebook of ours
+    # missing, or not a notebook of ours
+    except (OSError, ValueError, RecursionError, LookupError, TypeError):
         return False
     return old == notebook.metadata["kfcourse"]["fingerprint"]
 
 
-def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what: str) -> Iterator[Any]:
+def run_all(
+    jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what: str
+) -> Iterator[Any]:
     """The outcomes of all jobs as they come, in so many processes, with a progress bar.
 
     Parameters
@@ -164,9 +177,18 @@ def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what:
     try:
         yield from tqdm(done, desc=what, total=len(jobs), unit="notebook", disable=None)
     except BrokenProcessPool:
-        raise ValueError("a working process was killed (out of memory?); run the same again, with fewer --jobs") from None
+        raise ValueError(
+            "a working process was killed (out of memory?); run the same again, with fewer --jobs"
+        ) from None
 
 
-def plan(kind: str, folder: Path, variants: Iterable[str], letters: Sequence[str], **options: Any) -> list[Job]:
-    """One job a set and variant, each variant in a folder of its own; `options` are fields of the jobs."""
-    return [Job(letter, name, folder / safe(name), kind, **options) for name in variants for letter in letters]
+def plan(
+    kind: str, folder: Path, variants: Iterable[str], letters: Sequence[str], **options: Any
+) -> list[Job]:
+    """One job a set and variant, each variant in a folder of its own; `options` are fields of the
+    jobs."""
+    return [
+        Job(letter, name, folder / safe(name), kind, **options)
+        for name in variants
+        for letter in letters
+    ]

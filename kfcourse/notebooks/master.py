@@ -1,20 +1,22 @@
 """Masters of the exercise sets, and the notebooks made from them.
 
-A master is a MyST Markdown notebook, exercises/<set>/statement.md.  Text of the variant goes in by Jinja, with the
-delimiters [= ... =] and [% ... %] that neither Python nor LaTeX uses; what is between the lines
+A master is a MyST Markdown notebook, exercises/<set>/statement.md.  Text of the variant goes in by
+Jinja, with the delimiters [= ... =] and [% ... %] that neither Python nor LaTeX uses; what is
+between the lines
 
 ::
 
     # BEGIN SOLUTION            <!-- BEGIN SOLUTION -->
     # END SOLUTION              <!-- END SOLUTION -->
 
-of a code or text cell is the solution; a cell of nothing else, such as the answer to a question in words, is left out for
+of a code or text cell is the solution; a cell of nothing else, such as the answer to a question in
+words, is left out for
 students.  From a master come, for a variant,
 
 ::
 
     render(...)     the complete notebook, with solutions
-    student(...)    the same without: stubs that raise NotImplementedError, and the pictures to reach
+    student(...)   the same without: stubs that raise NotImplementedError, and the pictures to reach
     statement(...)  the text of the book's page: questions and stubs, nothing executed
 """
 
@@ -53,7 +55,10 @@ def read(letter: str, masters: Path | None = None) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise MasterError(f"no master {path}; leave --masters out, or name a folder that has {own.name}/statement.md") from None
+        raise MasterError(
+            f"no master {path}; leave --masters out, or name a folder that has "
+            f"{own.name}/statement.md"
+        ) from None
 
 
 def render(text: str, exercise: Exercise) -> NotebookNode:
@@ -91,7 +96,11 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
         if cell.cell_type == "code" and STUB in without_solution(cell.source, code=True):
             cell.metadata["kfcourse"] = {"answer": _defined(cell.source, next(answers, None))}
     notebook.metadata["kfcourse"] = {"set": exercise.letter, "variant": exercise.variant.name}
-    notebook.metadata["kernelspec"] = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    notebook.metadata["kernelspec"] = {
+        "display_name": "Python 3",
+        "language": "python",
+        "name": "python3",
+    }
     return notebook
 
 
@@ -107,7 +116,8 @@ def _check_markers(source: str, where: str) -> None:
         if BEGIN in line or END in line:
             if (BEGIN in line) == inside:
                 raise MasterError(
-                    f"{where}, line {number}: {BEGIN if inside else END} without {END if inside else BEGIN} before it"
+                    f"{where}, line {number}: {BEGIN if inside else END} without "
+                    f"{END if inside else BEGIN} before it"
                 )
             inside = not inside
     if inside:
@@ -115,7 +125,8 @@ def _check_markers(source: str, where: str) -> None:
 
 
 def without_solution(source: str, code: bool) -> str:
-    """The text without what is between the markers; in code a stub takes its place, unless there is nothing else."""
+    """The text without what is between the markers; in code a stub takes its place, unless there is
+    nothing else."""
     kept: list[str] = []
     inside = False
     for line in source.splitlines():
@@ -161,7 +172,8 @@ def student(notebook: NotebookNode, pictures: Mapping[str, bytes]) -> NotebookNo
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
             stub = STUB in cell.source
-            if stubs and not stub:  # it may call what is not written yet: "Run All" goes on to the other questions
+            # it may call what is not written yet: "Run All" goes on to the other questions
+            if stubs and not stub:
                 cell.metadata["tags"] = [*cell.metadata.get("tags", []), "raises-exception"]
             stubs = stubs or stub
             if cell.id in pictures:
@@ -174,14 +186,17 @@ def student(notebook: NotebookNode, pictures: Mapping[str, bytes]) -> NotebookNo
 
 def _picture(drawn_by: NotebookNode, png: bytes) -> NotebookNode:
     name, seen = drawn_by.id, drawn_by.metadata.get("alt", "The picture to reach")
-    cell = nbformat.v4.new_markdown_cell(f"The picture to reach:\n\n![{seen}](attachment:{name}.png)")
+    cell = nbformat.v4.new_markdown_cell(
+        f"The picture to reach:\n\n![{seen}](attachment:{name}.png)"
+    )
     cell.id = f"{name}-goal"
     cell["attachments"] = {f"{name}.png": {"image/png": base64.b64encode(png).decode()}}
     return cell
 
 
 def statement(notebook: NotebookNode, pictures: Mapping[str, tuple[str, int]]) -> str:
-    """The set as a page of the book: text, stubs and checks as plain code, what draws a picture folded under it.
+    """The set as a page of the book: text, stubs and checks as plain code, what draws a picture
+    folded under it.
 
     `pictures`: cell id to the path of the image and its width in pixels of a screen.
     """
@@ -195,8 +210,14 @@ def statement(notebook: NotebookNode, pictures: Mapping[str, tuple[str, int]]) -
             if cell.id in pictures:
                 path, width = pictures[cell.id]
                 seen = cell.metadata.get("alt", "")
-                parts.append(f"```{{figure}} {path}\n:alt: {seen}\n:width: {width}px\n\nThe picture to reach.\n```")
-                source = f'<details class="kf-code"><summary>Show the code</summary>\n\n{source}\n\n</details>'
+                parts.append(
+                    f"```{{figure}} {path}\n:alt: {seen}\n:width: {width}px\n\nThe picture to "
+                    f"reach.\n```"
+                )
+                source = (
+                    f'<details class="kf-code"><summary>Show the '
+                    f"code</summary>\n\n{source}\n\n</details>"
+                )
         parts.append(source)
     return "\n\n".join(parts) + "\n"
 
@@ -212,7 +233,9 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "model": model,
         "scalar": model.n == 1 and model.p == 1,
         "latex": sp.latex,
-        "equations": "\n\n".join(f"$$\n{block}\n$$" for block in (model.latex(values=False), *known_values(model))),
+        "equations": "\n\n".join(
+            f"$$\n{block}\n$$" for block in (model.latex(values=False), *known_values(model))
+        ),
         "timed": model.timed,
         "known": known(model),
         "k": ", k" if model.timed else "",  # the last argument of functions that take the step
@@ -225,7 +248,8 @@ def context(exercise: Exercise) -> dict[str, Any]:
 
 
 def known_values(model: Model) -> list[str]:
-    """An `aligned` block with the time and the first values of the inputs; none if the equations have neither."""
+    """An `aligned` block with the time and the first values of the inputs; none if the equations
+    have neither."""
     lines = model.known.latex() if model.timed else []
     return ["\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"] if lines else []
 
@@ -246,11 +270,15 @@ def heading(question: Question, russian: str = "") -> str:
 
 def check_cell(question: Question) -> str:
     """The cell in which a student checks an answer."""
-    return f'```{{code-cell}} python\n:tags: [check]\ntask.check("{question.name}", {question.function})\n```'
+    return (
+        f'```{{code-cell}} python\n:tags: [check]\ntask.check("{question.name}", '
+        f"{question.function})\n```"
+    )
 
 
 def opened(exercise: Exercise) -> str:
-    """Python for the variant: its name if it is a shipped one, else its table, so that the notebook needs no file."""
+    """Python for the variant: its name if it is a shipped one, else its table, so that the notebook
+    needs no file."""
     variant = exercise.variant
     with suppress(VariantError):  # no such is shipped
         if find_variant(variant.name) == variant:
@@ -259,9 +287,13 @@ def opened(exercise: Exercise) -> str:
 
 
 def parameter_symbols(exercise: Exercise) -> str:
-    """The line of code that makes the symbols of the parameters, and of what is known of every step."""
+    """The line of code that makes the symbols of the parameters, and of what is known of every
+    step."""
     names = [*exercise.model.parameters, *(s.name for s in exercise.model.known.symbols)]
     if not names:
         return "# this variant has no parameters"
     left = ", ".join(names)
-    return f'{left}{"," if len(names) == 1 else ""} = sp.symbols("{" ".join(names)}{"," if len(names) == 1 else ""}", real=True)'
+    return (
+        f"{left}{',' if len(names) == 1 else ''} = "
+        f'sp.symbols("{" ".join(names)}{"," if len(names) == 1 else ""}", real=True)'
+    )

@@ -1,4 +1,5 @@
-"""Python that a student could have written, printed from derived formulas: for solutions that differ from variant to variant."""
+"""Python that a student could have written, printed from derived formulas: for solutions that
+differ from variant to variant."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ SAME = 1e-9  # share of a variance that rounding explains
 
 
 class Apart(NamedTuple):
-    """An entry of a covariance, and what the linearised one misses of it over `DEVIATIONS`, as a share of the exact variances.
+    """An entry of a covariance, and what the linearised one misses of it over `DEVIATIONS`, as a
+    share of the exact variances.
 
     label : LaTeX;  equation : in words;  functions : names of the exact and the linearised one
     """
@@ -44,8 +46,15 @@ class Apart(NamedTuple):
         """The curve in a sentence."""
         half, one = (_percent(self.missing[place]) for place in (9, 19))
         large = DEVIATIONS[np.abs(self.missing) > 0.1]
-        tenth = f"it is more than a tenth from {large[0]:.2g} on" if large.size else "nowhere in the picture is it a tenth"
-        return f"The tangent's {self.label} is {half} at a standard deviation of 0.5, and {one} at 1; {tenth}."
+        tenth = (
+            f"it is more than a tenth from {large[0]:.2g} on"
+            if large.size
+            else "nowhere in the picture is it a tenth"
+        )
+        return (
+            f"The tangent's {self.label} is {half} at a standard deviation of 0.5, and {one} "
+            f"at 1; {tenth}."
+        )
 
 
 def _percent(share: float) -> str:
@@ -69,19 +78,29 @@ class Solutions:
         """Body of a function of the mean that returns the Jacobians by state and by noise."""
         part = Side.of(self.exercise.model, side)
         names = ("a_x", "a_v") if side == "object" else ("b_x", "b_w")
-        return self._body(side, dict(zip(names, (plain(part.A), plain(part.B)), strict=True)), cov=False)
+        return self._body(
+            side, dict(zip(names, (plain(part.A), plain(part.B)), strict=True)), cov=False
+        )
 
     def unexplained(self) -> str:
         """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
         return self._body("meter", {"R": self.exercise.closed("gaussian")["R"]})
 
     def derivation(self, name: str) -> str:
-        """Body of a function that returns a right derivation: the answer to the question of that name."""
+        """Body of a function that returns a right derivation: the answer to the question of that
+        name."""
         text = self.exercise.questions[name].answer(self.exercise)()
-        return "\n".join(['return """', *(part for line in text.splitlines() for part in _continued(line)), '"""'])
+        return "\n".join(
+            [
+                'return """',
+                *(part for line in text.splitlines() for part in _continued(line)),
+                '"""',
+            ]
+        )
 
     def apart(self) -> list[Apart]:
-        """Where the linearised covariances differ most from the exact ones, at the prior mean: of Theta and of F."""
+        """Where the linearised covariances differ most from the exact ones, at the prior mean: of
+        Theta and of F."""
         model, known = self.exercise.model, (5,) if self.exercise.model.timed else ()
         cov = DEVIATIONS[:, None, None] ** 2 * np.eye(model.n)
         mean = np.tile(model.prior.mean, (len(cov), 1))
@@ -93,19 +112,34 @@ class Solutions:
             )
         ):
             exact, tangent = (
-                self.exercise.functions(kind, *known)[1 - place](mean, cov)[-1] for kind in ("gaussian", "linearised")
+                self.exercise.functions(kind, *known)[1 - place](mean, cov)[-1]
+                for kind in ("gaussian", "linearised")
             )
             scale = np.sqrt(np.diagonal(exact, axis1=1, axis2=2))
             missing = (exact - tangent) / (scale[:, :, None] * scale[:, None, :])
             most = np.abs(missing).max(axis=0)
-            variances = np.diag(np.diagonal(most))  # a covariance is taken only if no variance differs
-            row, column = np.unravel_index((variances if variances.max() > SAME else most).argmax(), most.shape)
+            # a covariance is taken only if no variance differs
+            variances = np.diag(np.diagonal(most))
+            row, column = np.unravel_index(
+                (variances if variances.max() > SAME else most).argmax(), most.shape
+            )
             index = "" if exact.shape[1:] == (1, 1) else f"_{{{row + 1}{column + 1}}}"
-            found.append(Apart(f"${name}{index}$", equation, functions, colour, int(row), int(column), missing[:, row, column]))
+            found.append(
+                Apart(
+                    f"${name}{index}$",
+                    equation,
+                    functions,
+                    colour,
+                    int(row),
+                    int(column),
+                    missing[:, row, column],
+                )
+            )
         return found
 
     def meter_is_silent(self) -> bool:
-        """Whether the meter's noise, at the start and at the prior mean, leaves a combination of measurements exactly known."""
+        """Whether the meter's noise, at the start and at the prior mean, leaves a combination of
+        measurements exactly known."""
         model, known = self.exercise.model, (0,) if self.exercise.model.timed else ()
         measure, _ = self.exercise.functions("linearised", *known)
         F = measure(model.prior.mean[None], np.zeros((1, model.n, model.n)))[2][0]
@@ -131,34 +165,48 @@ class Solutions:
 
 
 def _continued(line: str) -> list[str]:
-    """A line of a text in three quotes, in lines that fit the page: a backslash at the end of a line joins them."""
+    """A line of a text in three quotes, in lines that fit the page: a backslash at the end of a
+    line joins them."""
     if line.startswith("#") or len(line) <= COLUMNS:
         return [line]
-    lines = textwrap.wrap(line, COLUMNS - 4, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(
+        line, COLUMNS - 4, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
     return [f"{part} \\" for part in lines[:-1]] + lines[-1:]
 
 
 def returned(code: str) -> list[str]:
     """A return statement, in brackets where it takes several lines."""
     lines = folded(code)
-    return [f"return {code}"] if len(lines) == 1 else ["return (", *("    " + line for line in lines), ")"]
+    return (
+        [f"return {code}"]
+        if len(lines) == 1
+        else ["return (", *("    " + line for line in lines), ")"]
+    )
 
 
 def folded(code: str) -> list[str]:
-    """Code that stands in brackets, in lines that fit the page; a comment at its end gets a line of its own above."""
+    """Code that stands in brackets, in lines that fit the page; a comment at its end gets a line of
+    its own above."""
     if len(code) <= COLUMNS:
         return [code]
     code, *comment = code.split("  # ")
-    lines = textwrap.wrap(code, COLUMNS, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(
+        code, COLUMNS, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
     return ["# " + name for name in comment] + lines
 
 
 def python(formula: Any) -> str:
     """A formula as Python code that a student could have written: sp.sin(x), sp.Rational(1, 2)."""
     if isinstance(formula, sp.MatrixBase):
-        rows = ", ".join("[" + ", ".join(python(entry) for entry in row) + "]" for row in formula.tolist())
+        rows = ", ".join(
+            "[" + ", ".join(python(entry) for entry in row) + "]" for row in formula.tolist()
+        )
         return f"sp.Matrix([{rows}])"
-    expression = sp.sympify(formula).replace(lambda e: e.func.__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
+    expression = sp.sympify(formula).replace(
+        lambda e: e.func.__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1
+    )
     return str(_Printer().doprint(expression))
 
 

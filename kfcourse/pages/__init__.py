@@ -1,6 +1,7 @@
 """What only the pages of the book call.
 
-verification  equations, sentences and numbers that are checked where they are printed; a check that fails stops the build
+verification  equations, sentences and numbers that are checked where they are printed; a check that
+fails stops the build
 exponents     squares completed in the exponents of normal laws
 tables        tables of numbers
 figures       the style of the figures, labels at the ends of curves
@@ -15,4 +16,14 @@ from kfcourse.pages.figures import COLOURS, book_style, label_ends
 from kfcourse.pages.tables import table
 from kfcourse.pages.verification import Unverified, agree, claim, typeset, verified
 
-__all__ = ["COLOURS", "Unverified", "agree", "book_style", "claim", "label_ends", "table", "typeset", "verified"]
+__all__ = [
+    "COLOURS",
+    "Unverified",
+    "agree",
+    "book_style",
+    "claim",
+    "label_ends",
+    "table",
+    "typeset",
+    "verified",
+]

@@ -1,16 +1,17 @@
 """The lab's filters as JavaScript, printed from the equations that the chapters derive and print.
 
-`kfcourse.filters.programs` makes numbers of the equations.  Those that hold for each trajectory become loops over the ensemble;
-those that find coefficients from means and covariances become assignments between the loops.  What comes
-out is, for each filter of a scalar model,
+`kfcourse.filters.programs` makes numbers of the equations.  Those that hold for each trajectory
+become loops over the ensemble; those that find coefficients from means and covariances become
+assignments between the loops.  What comes out is, for each filter of a scalar model,
 
 ::
 
     step(n, v, c, a)      estimates z and predictions of all trajectories, with the coefficients c
-    design(n, v, c, a)    the same, and finds the coefficients c, for which it reads the states x and the next ones
+    design(n, v, c, a)
+        the same, and finds the coefficients c, for which it reads the states x and the next ones
 
-with the model's parameters in v and an array for each letter in a.  So no formula is written twice, and a filter that runs
-in the browser is the one that the book derives.
+with the model's parameters in v and an array for each letter in a.  So no formula is written twice,
+and a filter that runs in the browser is the one that the book derives.
 """
 
 from __future__ import annotations
@@ -31,15 +32,18 @@ from kfcourse.lab.short_names import LAB, Structures, title
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
 
-LAB_SCRIPT = Path(__file__).parent / "data" / "lab.js"  # trajectories, the exact filter, statistics: no formula of a model
+# trajectories, the exact filter, statistics: no formula of a model
+LAB_SCRIPT = Path(__file__).parent / "data" / "lab.js"
 
-_GIVEN = (s.x, s.x_next, s.y, s.lam, s.Psi)  # what a step is given; of a running filter without the states
+# what a step is given; of a running filter without the states
+_GIVEN = (s.x, s.x_next, s.y, s.lam, s.Psi)
 _KEPT = (s.z, s.P, s.lam_next, s.Psi_next)  # what it leaves
 
 
 @cache
 def statistics(letters: frozenset[sp.MatrixSymbol]) -> Mapping[sp.Symbol, str]:
-    """How the means, covariances and inverted variances of letters, which the equations hold as symbols, are computed."""
+    """How the means, covariances and inverted variances of letters, which the equations hold as
+    symbols, are computed."""
     found = {}
     for left, right in product(sorted(letters, key=str), repeat=2):
         one, other = array_name(scalar(left)), array_name(scalar(right))
@@ -53,21 +57,31 @@ def statistics(letters: frozenset[sp.MatrixSymbol]) -> Mapping[sp.Symbol, str]:
 
 
 def filter_source(name: str, structures: Structures) -> str:
-    """A filter of the lab as the text of a JavaScript object { design, step }; `design` is null where nothing is to be found."""
+    """A filter of the lab as the text of a JavaScript object { design, step }; `design` is null
+    where nothing is to be found."""
     family, _, approximation = name.partition("-")
     structure = structures.gaussian if approximation == "gaussian" else structures.linearised
     rules = in_numbers(EQUATIONS[family], structures.model, structure, javascript.inverse)
     letters = {*_GIVEN, *(one.lhs for one in EQUATIONS[family])}
     known = statistics(frozenset(letters))
-    kept = [scalar(one) for one in _KEPT if one in letters and any(scalar(one) == left for left, _ in rules)]
-    coefficients = {left: array_name(left) for left, right in rules if right.free_symbols & known.keys()}
+    kept = [
+        scalar(one)
+        for one in _KEPT
+        if one in letters and any(scalar(one) == left for left, _ in rules)
+    ]
+    coefficients = {
+        left: array_name(left) for left, right in rules if right.free_symbols & known.keys()
+    }
     constants = list(structures.model.values)
     running = [(left, right) for left, right in rules if left not in coefficients]
     given = [scalar(one) for one in (s.y, s.lam, s.Psi)]
     step = _loop("step", running, kept, given, constants, coefficients)
     if not coefficients:
         return f"{{ design: null, step: {step.strip()} }}"
-    return f"{{ design: {_design(rules, kept, known, constants, coefficients)}, step: {step.strip()} }}"
+    return (
+        f"{{ design: {_design(rules, kept, known, constants, coefficients)}, step: "
+        f"{step.strip()} }}"
+    )
 
 
 def _design(
@@ -105,9 +119,13 @@ def _design(
 
 
 def _used_later(
-    group: Sequence[Rule], later: Sequence[Rule], known: Mapping[sp.Symbol, str], kept: Sequence[sp.Symbol]
+    group: Sequence[Rule],
+    later: Sequence[Rule],
+    known: Mapping[sp.Symbol, str],
+    kept: Sequence[sp.Symbol],
 ) -> list[sp.Symbol]:
-    """Of a group's letters those that the later rules need, also through means and covariances, and those that are kept."""
+    """Of a group's letters those that the later rules need, also through means and covariances, and
+    those that are kept."""
     used = set(kept)
     for _, right in later:
         texts = " ".join(known[one] for one in right.free_symbols & known.keys())
@@ -137,7 +155,8 @@ def _loop(
 
 
 def model_source(model: Model, names: Sequence[str] = LAB) -> str:
-    """A scalar model as the text of a JavaScript object: its equations, its structural functions, its filters.
+    """A scalar model as the text of a JavaScript object: its equations, its structural functions,
+    its filters.
 
     Raises
     ------
@@ -162,8 +181,15 @@ def model_source(model: Model, names: Sequence[str] = LAB) -> str:
         assert formulas is not None
         functions = formulas.functions
         before, after = {"z": formulas.z, "p": formulas.p}, {"m": formulas.m, "d": formulas.d}
-        predict = javascript.loop("predict", before, {key: functions[key] for key in ("tau", "Theta")}, constants=constants)
-        measure = javascript.loop("measure", after, {key: functions[key] for key in ("h", "G", "F")}, constants=constants)
+        predict = javascript.loop(
+            "predict",
+            before,
+            {key: functions[key] for key in ("tau", "Theta")},
+            constants=constants,
+        )
+        measure = javascript.loop(
+            "measure", after, {key: functions[key] for key in ("h", "G", "F")}, constants=constants
+        )
         parts[structure.name] = f"{{ predict: {predict.strip()}, measure: {measure.strip()} }}"
     filters = [f"{json.dumps(name)}: {filter_source(name, structures)}" for name in names]
     settings = {
@@ -174,17 +200,32 @@ def model_source(model: Model, names: Sequence[str] = LAB) -> str:
         "titles": {name: title(name) for name in names},
     }
     body = [f"{key}: {text.strip()}" for key, text in parts.items()]
-    return "{\n" + ",\n".join([*body, "filters: {\n" + ",\n".join(filters) + "}", f"...{json.dumps(settings)}"]) + "}"
+    return (
+        "{\n"
+        + ",\n".join(
+            [*body, "filters: {\n" + ",\n".join(filters) + "}", f"...{json.dumps(settings)}"]
+        )
+        + "}"
+    )
 
 
 def levels(model: Model) -> list[sp.Symbol]:
     """Parameters that only noises carry: sizes of noises, positive, for a logarithmic slider."""
     silent = {one: 0 for one in (*model.v, *model.w)}
-    quiet = set().union(*(e.subs(silent).free_symbols for e in (*model.state_equation, *model.meter_equation)))
+    quiet = set().union(
+        *(e.subs(silent).free_symbols for e in (*model.state_equation, *model.meter_equation))
+    )
     return [symbol for symbol, value in model.values.items() if symbol not in quiet and value > 0]
 
 
 def script(models: Mapping[str, Model]) -> str:
-    """`kfLab` and `kfModels`, an object of the models by name, as the text of a script that loads nothing."""
+    """`kfLab` and `kfModels`, an object of the models by name, as the text of a script that loads
+    nothing."""
     each = [f"{json.dumps(name)}: {model_source(model)}" for name, model in models.items()]
-    return javascript.RUNTIME + LAB_SCRIPT.read_text(encoding="utf-8") + "const kfModels = {\n" + ",\n".join(each) + "\n};\n"
+    return (
+        javascript.RUNTIME
+        + LAB_SCRIPT.read_text(encoding="utf-8")
+        + "const kfModels = {\n"
+        + ",\n".join(each)
+        + "\n};\n"
+    )

@@ -1,4 +1,5 @@
-"""The page "Derive it": worked chains as the checker sees them, and what its script needs to check those that readers type."""
+"""The page "Derive it": worked chains as the checker sees them, and what its script needs to check
+those that readers type."""
 
 from __future__ import annotations
 
@@ -16,7 +17,9 @@ from kfcourse.derivations.verdicts import MARKS, Verdict
 from kfcourse.lab.variants import Variant, find_variant
 
 SCRIPT = Path(__file__).parent / "data" / "derive.js"
-_TEMPLATES = Environment(loader=PackageLoader("kfcourse.pages"), trim_blocks=True, lstrip_blocks=True, autoescape=True)
+_TEMPLATES = Environment(
+    loader=PackageLoader("kfcourse.pages"), trim_blocks=True, lstrip_blocks=True, autoescape=True
+)
 
 
 def checked(text: str) -> Report:
@@ -25,8 +28,12 @@ def checked(text: str) -> Report:
 
 
 def shown(report: Report) -> str:
-    """A report as a list in HTML: each line with its mark, the named terms underlined, and what is said of it."""
-    return "\n".join(f'<ol class="kf-derived">\n{"".join(map(_item, chain.verdicts))}</ol>' for chain in report.chains)
+    """A report as a list in HTML: each line with its mark, the named terms underlined, and what is
+    said of it."""
+    return "\n".join(
+        f'<ol class="kf-derived">\n{"".join(map(_item, chain.verdicts))}</ol>'
+        for chain in report.chains
+    )
 
 
 def _item(verdict: Verdict) -> str:
@@ -41,17 +48,23 @@ def _marked(verdict: Verdict) -> str:
     pieces, end = [], 0
     for start, stop in sorted(verdict.spans):
         if start >= end:
-            pieces += [html.escape(verdict.text[end:start]), f"<mark>{html.escape(verdict.text[start:stop])}</mark>"]
+            pieces += [
+                html.escape(verdict.text[end:start]),
+                f"<mark>{html.escape(verdict.text[start:stop])}</mark>",
+            ]
             end = stop
     return "".join([*pieces, html.escape(verdict.text[end:])])
 
 
 def _coded(text: str) -> str:
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False).partition("\n")[0])
+    return re.sub(
+        r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False).partition("\n")[0]
+    )
 
 
 def described(variants: Mapping[str, Variant]) -> str:
-    """What the script needs of the variants and of the rules, as JSON: formulas and names, no result."""
+    """What the script needs of the variants and of the rules, as JSON: formulas and names, no
+    result."""
     plain = {name: one.plain("derivations") for name, one in variants.items()}
     models = {
         name: {
@@ -65,11 +78,16 @@ def described(variants: Mapping[str, Variant]) -> str:
         }
         for name, model in plain.items()
     }
-    return json.dumps({"models": models, "texts": {"rules": RULES, "definitions": DEFINITIONS}}, ensure_ascii=False)
+    return json.dumps(
+        {"models": models, "texts": {"rules": RULES, "definitions": DEFINITIONS}},
+        ensure_ascii=False,
+    )
 
 
 def field(variants: Mapping[str, Variant], example: str) -> str:
     """The field in which a reader types a chain, in HTML; without scripts it stays hidden."""
     data = described(variants).replace("</", "<\\/")
     script = SCRIPT.read_text(encoding="utf-8")
-    return _TEMPLATES.get_template("derive.html.j2").render(data=data, script=script, example=example, variants=variants)
+    return _TEMPLATES.get_template("derive.html.j2").render(
+        data=data, script=script, example=example, variants=variants
+    )

@@ -1,11 +1,14 @@
-"""Figures that answer when they are touched: pieces of HTML that load nothing, beside the still pictures of the same cells.
+"""Figures that answer when they are touched: pieces of HTML that load nothing, beside the still
+pictures of the same cells.
 
 ::
 
-    display(HTML(live_lab("fig-live-lab", models)))      the figure; a picture with this name is its first frame, and its paper
+    display(HTML(live_lab("fig-live-lab", models)))
+        the figure; a picture with this name is its first frame, and its paper
 
-The helper, data/figure.js, has axes, curves, handles, sliders and the state in the address.  Formulas come from SymPy through
-`kfcourse.symbolic.javascript`; the scripts in data/ have none of their own.
+The helper, data/figure.js, has axes, curves, handles, sliders and the state in the address.
+Formulas come from SymPy through `kfcourse.symbolic.javascript`; the scripts in data/ have none of
+their own.
 """
 
 from __future__ import annotations
@@ -32,7 +35,8 @@ _DASHES = {"--": "7 4", ":": "2 3", "-.": "7 3 2 3", "-": ""}
 
 
 def figure(name: str, says: str, code: str, call: str) -> str:
-    """A figure as HTML: `code` defines what `call`, a function of (root, name), draws with the helper.
+    """A figure as HTML: `code` defines what `call`, a function of (root, name), draws with the
+    helper.
 
     Parameters
     ----------
@@ -52,16 +56,20 @@ const root = document.currentScript.parentElement.querySelector(".kf-explore");
         if "</script" in text.lower():
             raise ValueError(f"{name}: a script within a page cannot hold </script")
     return (
-        f'<div class="kf-explored"><div class="kf-explore" data-name="{name}" role="group" aria-label="{says}"></div>'
-        f'<script>{helper}</script><script class="kf-code">{code}</script><script>{mount}</script></div>'
+        f'<div class="kf-explored"><div class="kf-explore" data-name="{name}" role="group" '
+        f'aria-label="{says}"></div>'
+        f"<script>{helper}</script><script "
+        f'class="kf-code">{code}</script><script>{mount}</script></div>'
     )
 
 
-_UNIT = re.compile(r"(?<=[\d}]) (?=(?:%|km|rad)(?![\w-]))")  # the space before it, which must not break
+# the space before it, which must not break
+_UNIT = re.compile(r"(?<=[\d}]) (?=(?:%|km|rad)(?![\w-]))")
 
 
 def drawn(name: str, says: str, script: str, parts: Iterable[str], settings: Any) -> str:
-    """A figure of data/<script>.js, which defines kf<Script>(root, name, settings) and leaves nothing else behind.
+    """A figure of data/<script>.js, which defines kf<Script>(root, name, settings) and leaves
+    nothing else behind.
 
     Parameters
     ----------
@@ -80,8 +88,14 @@ def drawn(name: str, says: str, script: str, parts: Iterable[str], settings: Any
     return figure(name, says, f"const {maker} = (() => {{\n{code}\nreturn {maker};\n}})();", call)
 
 
-def value(name: str, given: Mapping[str, sp.Symbol], e: sp.Expr, letters: Mapping[sp.Symbol, str] | None = None) -> str:
-    """A printed function of arrays and coefficients that writes one array, `value`, as `kfFigure.values` calls it."""
+def value(
+    name: str,
+    given: Mapping[str, sp.Symbol],
+    e: sp.Expr,
+    letters: Mapping[sp.Symbol, str] | None = None,
+) -> str:
+    """A printed function of arrays and coefficients that writes one array, `value`, as
+    `kfFigure.values` calls it."""
     return javascript.loop(name, columns(given), columns({"value": e}), coefficients=letters)
 
 
@@ -96,7 +110,8 @@ def rounded(rows: Iterable[Iterable[float]]) -> list[list[float]]:
 
 
 def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
-    """The lab under the reader's hand: all filters of a scalar variant, designed and compared while its parameters move.
+    """The lab under the reader's hand: all filters of a scalar variant, designed and compared while
+    its parameters move.
 
     Parameters
     ----------
@@ -105,9 +120,9 @@ def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
     variants : dict
         Scalar variants by name; 53 is shown first, at step 4.
     """
-    source = script({key: variant.plain("live figures") for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(
-        encoding="utf-8"
-    )
+    source = script({key: variant.plain("live figures") for key, variant in variants.items()}) + (
+        DATA / "live-lab.js"
+    ).read_text(encoding="utf-8")
     given: dict[str, Any] = {
         "styles": {one: line_style(one) for one in LAB},
         "titles": {one: title(one) for one in LAB},
@@ -118,7 +133,9 @@ def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
         "steps": STEPS,
         "reach": normal_bound(),
     }
-    return figure(name, "The lab, live", source, f"(root, name) => kfLiveLab(root, name, {json.dumps(given)})")
+    return figure(
+        name, "The lab, live", source, f"(root, name) => kfLiveLab(root, name, {json.dumps(given)})"
+    )
 
 
 def line_style(name: str) -> dict[str, str]:
@@ -174,7 +191,8 @@ def two_lines(
     left: sp.Expr,
     first: Mapping[str, float],
 ) -> str:
-    """A signal, its tangent and the line that is best on average, with the law of the state under the reader's hand.
+    """A signal, its tangent and the line that is best on average, with the law of the state under
+    the reader's hand.
 
     Parameters
     ----------
@@ -191,7 +209,13 @@ def two_lines(
     first : dict
         The "mean" and the "variance" shown first.
     """
-    numbers = dict(tangentMean=tangent[0], tangentSlope=tangent[1], bestMean=best[0], bestSlope=best[1], left=left)
+    numbers = dict(
+        tangentMean=tangent[0],
+        tangentSlope=tangent[1],
+        bestMean=best[0],
+        bestSlope=best[1],
+        left=left,
+    )
     curves = {
         "signal": signal,
         "density": density,
@@ -223,9 +247,11 @@ def gains(
     name : str
         Of the figure.
     prediction, measurement, variance : Symbol
-        Of the measurement that is corrected with; the last is the variance of the estimate before, of a filter that has one.
+        Of the measurement that is corrected with; the last is the variance of the estimate before,
+        of a filter that has one.
     estimates : dict
-        Of filters by their names of the lab, affine in the measurement: the slope is the gain.  Handles are on the first.
+        Of filters by their names of the lab, affine in the measurement: the slope is the gain.
+        Handles are on the first.
     dots : (predictions, gains)
         Of trajectories, under the curves.
     variances : (float, float)
@@ -235,12 +261,20 @@ def gains(
     """
     letters, each = {prediction: "lambda", variance: "p"}, []
     for one, estimate in estimates.items():
-        gain = value("gain", {"lambda": prediction}, sp.diff(estimate, measurement), {variance: "p"})
+        gain = value(
+            "gain", {"lambda": prediction}, sp.diff(estimate, measurement), {variance: "p"}
+        )
         made = value("estimate", {"y": measurement}, estimate, letters)
         each.append(f"{json.dumps(one)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
     looks = {one: {"label": title(one), **line_style(one)} for one in estimates}
     settings = {"first": dict(first), "variances": variances, "dots": rounded(dots), "looks": looks}
-    return drawn(name, "Gains of filters", "gains", ["const filters = {\n" + ",\n".join(each) + "\n};\n"], settings)
+    return drawn(
+        name,
+        "Gains of filters",
+        "gains",
+        ["const filters = {\n" + ",\n".join(each) + "\n};\n"],
+        settings,
+    )
 
 
 def _read(name: str) -> str:

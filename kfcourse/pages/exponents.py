@@ -1,6 +1,7 @@
 """Exponents of normal laws, as the derivations of the theory chapters use them.
 
-A product of normal densities has an exponent that is quadratic in the state; completing its square gives mean and variance.
+A product of normal densities has an exponent that is quadratic in the state; completing its square
+gives mean and variance.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ def complete_square(exponent: sp.Expr, variable: sp.Symbol) -> Square:
 
 
 def log_integral(exponent: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-    """Logarithm of the integral of exp(exponent) over the variable, in which the exponent is quadratic with b < 0.
+    """Logarithm of the integral of exp(exponent) over the variable, in which the exponent is
+    quadratic with b < 0.
 
     ln Integral exp(a x + b x^2 + d) dx = `rest` + ln(2 pi `variance`) / 2
     """

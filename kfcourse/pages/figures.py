@@ -24,7 +24,8 @@ from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 from kfcourse.symbolic.writing import by_thousands
 
-# Okabe and Ito's, distinguishable by the colour-blind; those of the filters are in kfcourse.lab.plots.
+# Okabe and Ito's, distinguishable by the colour-blind; those of the filters are in
+# kfcourse.lab.plots.
 COLOURS = {
     "truth": "#000000",
     "measurement": "#999999",
@@ -52,7 +53,9 @@ def book_style(ground: str = "none") -> None:
     # The whole figure, as wide as it says: constrained layout has found room for everything.
     set_matplotlib_formats("retina", bbox_inches=None)
     matplotlib.style.use(DATA / "book.mplstyle")
-    grounds: dict[Any, Any] = dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), ground)
+    grounds: dict[Any, Any] = dict.fromkeys(
+        ("figure.facecolor", "axes.facecolor", "savefig.facecolor"), ground
+    )
     rcParams.update(grounds)
     shell: Any = InteractiveShell.instance()
     formatter = shell.display_formatter.formatters["image/png"]
@@ -90,10 +93,12 @@ def _parted(format_ticks: Callable[..., list[str]], marks: Sequence[float]) -> l
 
 
 def label_ends(ax: Axes, least: float = 0.07, lowest: float = -np.inf, **text: Any) -> None:
-    """Write each curve's label at its right end, with a piece of the curve: its colour, dashes and marker.
+    """Write each curve's label at its right end, with a piece of the curve: its colour, dashes and
+    marker.
 
-    Labels are at least the fraction `least` of the height apart, a thin line leads to each that stands beside its curve's end,
-    and none stands below the value `lowest` (a line of zero that all curves are above, say).
+    Labels are at least the fraction `least` of the height apart, a thin line leads to each that
+    stands beside its curve's end, and none stands below the value `lowest` (a line of zero that all
+    curves are above, say).
     """
     lines = [line for line in ax.get_lines() if not str(line.get_label()).startswith("_")]
     ends = []
@@ -104,24 +109,49 @@ def label_ends(ax: Axes, least: float = 0.07, lowest: float = -np.inf, **text: A
             ends.append((line, *points[-1]))
     ax.autoscale_view()  # limits are final
     corner = ax.transAxes.inverted()
-    found = np.array([corner.transform(ax.transData.transform((x, y))) for _, x, y in ends]).reshape(-1, 2)
-    floor = corner.transform(ax.transData.transform((0, lowest)))[1] if np.isfinite(lowest) else -np.inf
+    found = np.array(
+        [corner.transform(ax.transData.transform((x, y))) for _, x, y in ends]
+    ).reshape(-1, 2)
+    floor = (
+        corner.transform(ax.transData.transform((0, lowest)))[1] if np.isfinite(lowest) else -np.inf
+    )
     heights = found[:, 1]
     places = dict(zip(np.argsort(heights), _apart(np.sort(heights), least, floor), strict=True))
     for number, (line, _, _) in enumerate(ends):
         place = places[number]
         if abs(place - heights[number]) > 0.01:
-            leader = {"color": line.get_color(), "linewidth": 0.6, "alpha": 0.6, "transform": ax.transAxes, "clip_on": False}
-            ax.add_line(Line2D([found[number, 0], 1.02], [heights[number], place], label="_leader", **leader))
+            leader = {
+                "color": line.get_color(),
+                "linewidth": 0.6,
+                "alpha": 0.6,
+                "transform": ax.transAxes,
+                "clip_on": False,
+            }
+            ax.add_line(
+                Line2D(
+                    [found[number, 0], 1.02], [heights[number], place], label="_leader", **leader
+                )
+            )
         label = Legend(
-            ax, [line], [line.get_label()], loc="center left", bbox_to_anchor=(1.02, place), frameon=False, borderpad=0,
-            borderaxespad=0, handlelength=2.2, handletextpad=0.4, labelcolor="linecolor", prop=text or None,
-        )  # fmt: skip
+            ax,
+            [line],
+            [line.get_label()],
+            loc="center left",
+            bbox_to_anchor=(1.02, place),
+            frameon=False,
+            borderpad=0,
+            borderaxespad=0,
+            handlelength=2.2,
+            handletextpad=0.4,
+            labelcolor="linecolor",
+            prop=text or None,
+        )
         ax.add_artist(label).set_clip_on(False)  # else constrained layout leaves it no room
 
 
 def _apart(heights: np.ndarray, least: float, floor: float) -> np.ndarray:
-    """Ascending heights moved as little as it takes to be `least` apart, the first not below `floor`."""
+    """Ascending heights moved as little as it takes to be `least` apart, the first not below
+    `floor`."""
     steps = least * np.arange(len(heights))
     free = heights - steps  # must not descend: pool neighbours that do
     pools: list[tuple[float, int]] = []
@@ -130,4 +160,8 @@ def _apart(heights: np.ndarray, least: float, floor: float) -> np.ndarray:
         while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
             (one, n), (other, m) = pools[-2], pools[-1]
             pools[-2:] = [((one * n + other * m) / (n + m), n + m)]
-    return np.maximum(np.concatenate([np.full(n, mean) for mean, n in pools]), floor) + steps if pools else free
+    return (
+        np.maximum(np.concatenate([np.full(n, mean) for mean, n in pools]), floor) + steps
+        if pools
+        else free
+    )

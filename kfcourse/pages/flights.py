@@ -27,7 +27,8 @@ LOOKS: dict[str, dict[str, Any]] = {
 
 
 def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) -> Figure:
-    """The flight in space with the estimate `shown` of one run; RMS errors (m) of all estimates (steps, runs, 3) over time."""
+    """The flight in space with the estimate `shown` of one run; RMS errors (m) of all estimates
+    (steps, runs, 3) over time."""
     fig = plt.figure(figsize=(WIDTH, 3.5))
     grid = fig.add_gridspec(1, 2, width_ratios=[1.2, 1])
     space: Any = fig.add_subplot(grid[0], projection="3d")
@@ -36,32 +37,49 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
         inside = track.part == part
         x, y, z = (track.position[inside] / 1000).T
         space.plot(x, y, z, color=colour, linewidth=2)
-        space.plot(x, y, 0 * z, color=COLOURS["measurement"], linewidth=0.7)  # the shadow on the ground
+        # the shadow on the ground
+        space.plot(x, y, 0 * z, color=COLOURS["measurement"], linewidth=0.7)
         ax.axvline(track.time[inside][0], color=COLOURS["measurement"], linewidth=0.6)
         ax.text(track.time[inside].mean(), 1500, str(part), color=colour, ha="center")
     space.plot(*(estimates[shown][5:, 0] / 1000).T, "--", color="black", linewidth=1)
     space.set(xlabel="east (km)", ylabel="north (km)", zlim=(0, 10), title="flight, altitude in km")
     for name, positions in estimates.items():
         squares = ((positions - track.position[:, None]) ** 2).sum(axis=-1)
-        ax.semilogy(track.time, np.sqrt(squares.mean(axis=1)), linewidth=1.2, label=name, **LOOKS[name])
+        ax.semilogy(
+            track.time, np.sqrt(squares.mean(axis=1)), linewidth=1.2, label=name, **LOOKS[name]
+        )
     ax.set(xlabel="time (s)", title="RMS error (m)", ylim=(25, 2000))
     fig.legend(loc="outside lower center", ncols=2)
     return fig
 
 
 def space_and_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
-    """Truth, measurements (steps, runs, 3) and estimates of one run along the whole flight, in space and in plan."""
+    """Truth, measurements (steps, runs, 3) and estimates of one run along the whole flight, in
+    space and in plan."""
     fig = plt.figure(figsize=(WIDTH, 3.9))
     grid = fig.add_gridspec(1, 2, width_ratios=[1.15, 1])
     space: Any = fig.add_subplot(grid[0], projection="3d")
     plan = fig.add_subplot(grid[1])
     space.set_box_aspect(None, zoom=1.2)
     for ax, axes in ((space, 3), (plan, 2)):
-        ax.plot(*(y[:, 0, :axes] / 1000).T, ".", color=COLOURS["measurement"], markersize=1.5, label="measurements")
-        ax.plot(*(track.position[:, :axes] / 1000).T, color=COLOURS["estimate"], linewidth=1.2, label="true path")
+        ax.plot(
+            *(y[:, 0, :axes] / 1000).T,
+            ".",
+            color=COLOURS["measurement"],
+            markersize=1.5,
+            label="measurements",
+        )
+        ax.plot(
+            *(track.position[:, :axes] / 1000).T,
+            color=COLOURS["estimate"],
+            linewidth=1.2,
+            label="true path",
+        )
         for name, positions in estimates.items():
             ax.plot(*(positions[:, 0, :axes] / 1000).T, linewidth=1.2, label=name, **LOOKS[name])
-    space.set(xlabel="east (km)", ylabel="north (km)", zlim=(0, 10), title="in space, altitude in km")
+    space.set(
+        xlabel="east (km)", ylabel="north (km)", zlim=(0, 10), title="in space, altitude in km"
+    )
     plan.set(xlabel="east (km)", ylabel="north (km)", title="in plan")
     plan.set_aspect("equal", adjustable="datalim")
     for part in range(1, 6):
@@ -73,7 +91,8 @@ def space_and_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Fi
 
 
 def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
-    """Truth, measurements (steps, runs, 3) and estimates of one run, in plan, on pieces of parts 1 to 4."""
+    """Truth, measurements (steps, runs, 3) and estimates of one run, in plan, on pieces of parts 1
+    to 4."""
     second, third, fourth = (track.time[track.part == part][0] for part in (2, 3, 4))
     pieces = {
         "part 1": (60.0, 75.0),
@@ -92,13 +111,19 @@ def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
         ax.set_aspect("equal", adjustable="datalim")
         ax.locator_params(axis="x", nbins=3)
     axes[0].set_ylabel("north (km)")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(estimates))
+    fig.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(estimates)
+    )
     return fig
 
 
-def by_part(parts: Sequence[str], columns: Mapping[str, Estimate], heading: str = "RMS error (m)") -> Shown:
-    """A table with a row for each part of the flight; columns of `rms_by_part` or `rms_difference`, value ± standard error."""
+def by_part(
+    parts: Sequence[str], columns: Mapping[str, Estimate], heading: str = "RMS error (m)"
+) -> Shown:
+    """A table with a row for each part of the flight; columns of `rms_by_part` or `rms_difference`,
+    value ± standard error."""
     rows: dict[str, list[Any]] = {heading: list(parts)}
     for name, one in columns.items():
-        rows[name] = list(zip(one.value.round(1) + 0.0, one.standard_error, strict=True))  # no "-0.0"
+        # no "-0.0"
+        rows[name] = list(zip(one.value.round(1) + 0.0, one.standard_error, strict=True))
     return table(rows, ".1f")

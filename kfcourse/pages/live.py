@@ -1,14 +1,16 @@
-"""The live page: a reader moves the pointer, and the filter of `kfcourse.scenarios.pointer` cleans the track in the browser.
+"""The live page: a reader moves the pointer, and the filter of `kfcourse.scenarios.pointer` cleans
+the track in the browser.
 
 ::
 
     recording = record(hand_track(seed=10), seed=6)      a track and its noise, every 10 ms
-    HTML(page(recording))                                the page, one piece of HTML that loads nothing
+    HTML(page(recording))   the page, one piece of HTML that loads nothing
 
-The page runs the filter itself, in JavaScript (templates/live-filter.js.j2).  The matrices A, B, H and those of the
-start-up are printed from the SymPy expressions of `kfcourse.scenarios.pointer`; predict and correct are written there, in
-Joseph's form, and a test compares them in a browser with `kfcourse.linear`.  The page samples the recording, or the
-reader's own track, at the interval that a slider says, with noise of the standard deviation sigma that another says.
+The page runs the filter itself, in JavaScript (templates/live-filter.js.j2).  The matrices A, B, H
+and those of the start-up are printed from the SymPy expressions of `kfcourse.scenarios.pointer`;
+predict and correct are written there, in Joseph's form, and a test compares them in a browser with
+`kfcourse.linear`.  The page samples the recording, or the reader's own track, at the interval that
+a slider says, with noise of the standard deviation sigma that another says.
 """
 
 from __future__ import annotations
@@ -42,7 +44,8 @@ _DECIMALS = 3
 
 
 class Slider(NamedTuple):
-    """Range of a setting: integers, so that a value is the same number in the page and in Python."""
+    """Range of a setting: integers, so that a value is the same number in the page and in
+    Python."""
 
     low: int
     high: int
@@ -50,7 +53,11 @@ class Slider(NamedTuple):
 
 
 # ms; px; tenths of a decade: the intensity is 10^(value / 10) px^2/s^3.
-SLIDERS = {"interval": Slider(10, 200, 10), "sigma": Slider(1, 40, 1), "decibels": Slider(30, 80, 1)}
+SLIDERS = {
+    "interval": Slider(10, 200, 10),
+    "sigma": Slider(1, 40, 1),
+    "decibels": Slider(30, 80, 1),
+}
 
 
 class Recording(NamedTuple):
@@ -68,7 +75,8 @@ class Recording(NamedTuple):
     noise: Array
 
     def sampled(self, interval: float, measurement_sd: float) -> tuple[Array, Array]:
-        """What the page takes from the recording: true positions (steps, 2), and noisy ones (steps, 1, 2) for `pointer.follow`.
+        """What the page takes from the recording: true positions (steps, 2), and noisy ones (steps,
+        1, 2) for `pointer.follow`.
 
         Parameters
         ----------
@@ -79,23 +87,30 @@ class Recording(NamedTuple):
         """
         every = round(interval / GRID) if np.isfinite(interval) else 0
         if every < 1 or abs(every * GRID - interval) > 1e-9:
-            raise ValueError(f"interval: expected a multiple of {GRID} s, the grid of the recording; got {interval}")
+            raise ValueError(
+                f"interval: expected a multiple of {GRID} s, the grid of the recording; got "
+                f"{interval}"
+            )
         if not (np.isfinite(measurement_sd) and measurement_sd >= 0):
             raise ValueError(
-                f"measurement_sd is a standard deviation: expected a number that is not negative, got {measurement_sd}"
+                f"measurement_sd is a standard deviation: expected a number that is not negative, "
+                f"got {measurement_sd}"
             )
         truth = self.position[::every]
         return truth, (truth + measurement_sd * self.noise[::every])[:, None]
 
 
 def record(track: HandTrack, seed: int) -> Recording:
-    """The track and one realisation of the noise, rounded to what the page holds: 0.001 px, 0.001 sigma."""
+    """The track and one realisation of the noise, rounded to what the page holds: 0.001 px, 0.001
+    sigma."""
     samples = sample(track, GRID, 1.0, runs=1, seed=seed)
     position = samples.state[:, 0, :2]
     return Recording(position.round(_DECIMALS), (samples.y[:, 0] - position).round(_DECIMALS))
 
 
-def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int = 57, name: str = "live") -> str:
+def page(
+    recording: Recording, interval: int = 20, sigma: int = 8, decibels: int = 57, name: str = "live"
+) -> str:
     """The live page as a piece of HTML: markup, style, script and the recording; it loads nothing.
 
     Parameters
@@ -107,10 +122,12 @@ def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int
     sigma : int
         Of the noise of each coordinate, px: 1, 2, ..., 40.
     decibels : int
-        Of the intensity S of the acceleration's white noise, 10^(decibels / 10) px^2/s^3: 30, 31, ..., 80.  The filter's Q is
-        that of `pointer.uniform_acceleration` with acceleration_sd = sqrt(S / interval).
+        Of the intensity S of the acceleration's white noise, 10^(decibels / 10) px^2/s^3: 30, 31,
+        ..., 80.  The filter's Q is that of `pointer.uniform_acceleration` with acceleration_sd =
+        sqrt(S / interval).
     name : str
-        With which its state begins in the address; of the figure whose place it takes on the screen, if there is one.
+        With which its state begins in the address; of the figure whose place it takes on the
+        screen, if there is one.
 
     Returns
     -------
@@ -123,17 +140,33 @@ def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int
         A setting that its slider cannot show; a recording that is empty or not finite.
     """
     position, noise = (np.asarray(part, dtype=float) for part in recording)
-    if position.ndim != 2 or position.shape[1] != 2 or len(position) < 1 or noise.shape != position.shape:
-        raise ValueError(f"a recording has positions and noise of one shape, (steps, 2); got {position.shape} and {noise.shape}")
+    if (
+        position.ndim != 2
+        or position.shape[1] != 2
+        or len(position) < 1
+        or noise.shape != position.shape
+    ):
+        raise ValueError(
+            f"a recording has positions and noise of one shape, (steps, 2); got {position.shape} "
+            f"and {noise.shape}"
+        )
     if not (np.isfinite(position).all() and np.isfinite(noise).all()):
-        raise ValueError("a recording must be finite: the page has no missing samples; use record(track, seed)")
+        raise ValueError(
+            "a recording must be finite: the page has no missing samples; use record(track, seed)"
+        )
     settings = {"interval": interval, "sigma": sigma, "decibels": decibels}
     for key, value in settings.items():
         slider = SLIDERS[key]
         if value not in range(slider.low, slider.high + 1, slider.step):
-            raise ValueError(f"{key}: expected {slider.low}, {slider.low + slider.step}, ..., {slider.high}, got {value}")
+            raise ValueError(
+                f"{key}: expected {slider.low}, {slider.low + slider.step}, ..., {slider.high}, "
+                f"got {value}"
+            )
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kfcourse.pages"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("kfcourse.pages"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )
     content = {
         "name": name,
@@ -144,7 +177,9 @@ def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int
         "settings": settings,
         "screen": SCREEN,
         "grid": GRID,
-        "recording": json.dumps({"position": position.tolist(), "noise": noise.tolist()}, separators=(",", ":")),
+        "recording": json.dumps(
+            {"position": position.tolist(), "noise": noise.tolist()}, separators=(",", ":")
+        ),
         "matrices": {
             name: _javascript(matrix)
             for name, matrix in {

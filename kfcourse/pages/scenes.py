@@ -50,14 +50,16 @@ def one_measurement(
     prior: tuple[float, float],
     noises: tuple[float, float],
 ) -> str:
-    """A filter over a record of which one measurement can be moved, and the noises that it believes in.
+    """A filter over a record of which one measurement can be moved, and the noises that it believes
+    in.
 
     Parameters
     ----------
     name : str
         Of the figure.
     step : function
-        (lambda, Psi, y, Q, R) -> (z, p, next lambda, next Psi), also of SymPy's symbols: what the page shows is what runs.
+        (lambda, Psi, y, Q, R) -> (z, p, next lambda, next Psi), also of SymPy's symbols: what the
+        page shows is what runs.
     x, y : sequence of float
         States and measurements.
     at : int
@@ -103,7 +105,9 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
         Parameters with other names.
     """
     if set(model.parameters) != set("cegf"):
-        raise ValueError(f"expected a model with the parameters c, e, g, f, got {', '.join(model.parameters)}")
+        raise ValueError(
+            f"expected a model with the parameters c, e, g, f, got {', '.join(model.parameters)}"
+        )
     steps, runs = x.shape
     state, z, p, measured, h, F = sp.symbols("x z p y h F")
     parts = [
@@ -120,8 +124,15 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
         "x": rounded(x),
         "y": rounded(y),
         "faults": FAULTS,
-        "hidden": shown + [(letter, f"Hidden {letter}", kind) for letter, kind in zip("ABCDE", HIDDEN, strict=True)],
-        "bounds": {"nees": one_step, "nis": one_step, "correlation": [(-by_lag).tolist(), by_lag.tolist()]},
+        "hidden": shown
+        + [
+            (letter, f"Hidden {letter}", kind) for letter, kind in zip("ABCDE", HIDDEN, strict=True)
+        ],
+        "bounds": {
+            "nees": one_step,
+            "nis": one_step,
+            "correlation": [(-by_lag).tolist(), by_lag.tolist()],
+        },
     }
     return drawn(name, "Which noise is wrong?", "faults", parts, settings)
 
@@ -157,7 +168,9 @@ def slip(
     letters = {sigma: "sigma"}
     given = {"Delta": error, "n": noises[0], "v": noises[1]}
     parts = [
-        javascript.loop("step", columns(given), columns({"Delta": following}), coefficients=letters),
+        javascript.loop(
+            "step", columns(given), columns({"Delta": following}), coefficients=letters
+        ),
         value("potential", {"Delta": error}, potential, letters),
     ]
     settings = {"noises": [rounded(one) for one in draws], "first": dict(first), "range": levels}
@@ -165,7 +178,12 @@ def slip(
 
 
 def grid_step(
-    name: str, x: sp.Symbol, density: sp.Expr, first: float, places: tuple[float, float], steps: tuple[float, float]
+    name: str,
+    x: sp.Symbol,
+    density: sp.Expr,
+    first: float,
+    places: tuple[float, float],
+    steps: tuple[float, float],
 ) -> str:
     """A density and its masses on nodes whose distance can be moved.
 
@@ -181,26 +199,43 @@ def grid_step(
     places, steps : (float, float)
         Where the nodes are, and what their distance is moved between.
     """
-    settings = {"first": first, "low": places[0], "high": places[1], "least": steps[0], "most": steps[1]}
-    return drawn(name, "Masses on a grid", "grid-step", [value("density", {"x": x}, density)], settings)
+    settings = {
+        "first": first,
+        "low": places[0],
+        "high": places[1],
+        "least": steps[0],
+        "most": steps[1],
+    }
+    return drawn(
+        name, "Masses on a grid", "grid-step", [value("density", {"x": x}, density)], settings
+    )
 
 
 def leading(found: ParameterMap) -> dict[str, Any]:
-    """What `who_leads` shows of a map whose first parameter has one value: in per cent, with 95 % intervals.
+    """What `who_leads` shows of a map whose first parameter has one value: in per cent, with 95 %
+    intervals.
 
     Returns
     -------
     dict
-        "trajectories" that the exact filter had; "ratios" of the second parameter to the first; "gaps", of each ratio and step
-        [value, low, high] by filter; "leaders", of each ratio and step the most accurate filter and how many others are not
-        significantly worse.
+        "trajectories" that the exact filter had; "ratios" of the second parameter to the first;
+        "gaps", of each ratio and step [value, low, high] by filter; "leaders", of each ratio and
+        step the most accurate filter and how many others are not significantly worse.
     """
     ratios, gaps, leaders = [], [], []
     for (first, second), result in found.cells.items():
         ratios.append(float(f"{second / first:.3g}"))
         steps = range(len(result.gap(LAB[0]).value))
         of = {name: (result.gap(name).value, *result.gap(name).interval()) for name in LAB}
-        gaps.append([{name: [round(100 * float(one[k]), 4) for one in parts] for name, parts in of.items()} for k in steps])
+        gaps.append(
+            [
+                {
+                    name: [round(100 * float(one[k]), 4) for one in parts]
+                    for name, parts in of.items()
+                }
+                for k in steps
+            ]
+        )
         order = [result.leaders(k) for k in steps]
         leaders.append([(best, len(others)) for best, *others in order])
     exact = min(result.runs for result in found.cells.values())
@@ -224,7 +259,9 @@ def who_leads(name: str, found: Mapping[str, Any], first: tuple[int, float]) -> 
     settings = {
         **found,
         "looks": looks,
-        "kinds": [{"label": label, "colour": colour, "width": 9} for colour, label in kinds.items()],
+        "kinds": [
+            {"label": label, "colour": colour, "width": 9} for colour, label in kinds.items()
+        ],
         "first": {"k": first[0], "ratio": found["ratios"].index(first[1])},
     }
     return drawn(name, "Which filter is the most accurate", "who-leads", [], settings)

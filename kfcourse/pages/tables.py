@@ -11,7 +11,9 @@ from kfcourse.pages.verification import Shown
 from kfcourse.symbolic.writing import by_thousands
 
 
-def table(columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | str = "", caption: str = "") -> Shown:
+def table(
+    columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | str = "", caption: str = ""
+) -> Shown:
     """A table from its columns.
 
     Parameters
@@ -47,7 +49,11 @@ def _cell(entry: Any, style: str) -> str:
     if isinstance(entry, str):
         return entry
     if isinstance(entry, tuple):
-        return " ± ".join(_cell(part, style if number == 0 else style.replace("+", "")) for number, part in enumerate(entry))
+        return " ± ".join(
+            _cell(part, style if number == 0 else style.replace("+", ""))
+            for number, part in enumerate(entry)
+        )
     if isinstance(entry, float | np.floating) and np.isnan(entry):
         return "–"
-    return by_thousands(format(entry, style)).replace("-", "−").replace("%", "\u00a0%")  # as `claim` writes it
+    # as `claim` writes it
+    return by_thousands(format(entry, style)).replace("-", "−").replace("%", "\u00a0%")

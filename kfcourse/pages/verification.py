@@ -3,11 +3,13 @@
 ::
 
     verified((p, Psi - K*S*Psi), where={p: p_k, K: K_k})     equations: printed, and shown to hold
-    claim("The gain tends to 0.62.", abs(K - 0.62) < 0.005)  a sentence, printed if its conditions hold
-    agree("Formula and filter agree.", a, b, within=1e-12)   a sentence about numbers that are equal within a tolerance
-    typeset((p, p_k))                                        equations that define something: printed, and said to
+    claim("The gain tends to 0.62.", abs(K - 0.62) < 0.005)   a sentence, printed if it holds
+    agree("Formula and filter agree.", a, b, within=1e-12)
+        a sentence about numbers that are equal within a tolerance
+    typeset((p, p_k))   equations that define something: printed, and said to
 
-A printed equation carries a mark that says how it was verified.  The build of the book counts the marks and lists them.
+A printed equation carries a mark that says how it was verified.  The build of the book counts the
+marks and lists them.
 """
 
 from __future__ import annotations
@@ -61,14 +63,16 @@ def verified(
     Parameters
     ----------
     *equations : (left, right, ...)
-        Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is printed and not checked,
-        so at least two others are needed then.  Where all sides print alike a string before them says what they are; without
-        it "both sides" stands there.  `sympy.Eq` is taken too, unless SymPy has already made it true or false.
+        Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is
+        printed and not checked, so at least two others are needed then.  Where all sides print
+        alike a string before them says what they are; without it "both sides" stands there.
+        `sympy.Eq` is taken too, unless SymPy has already made it true or false.
     where : mapping of symbols to expressions
-        What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference is taken, as often as it
-        takes.
+        What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference
+        is taken, as often as it takes.
     digits : int, optional
-        Compare numbers instead, at the points `at`, to so many digits: for integrals and sums that SymPy does not take.
+        Compare numbers instead, at the points `at`, to so many digits: for integrals and sums that
+        SymPy does not take.
     at : sequence of mappings of symbols to numbers, optional
         Three points are drawn if there are none, positive for positive symbols.
     label : str, optional
@@ -90,34 +94,52 @@ def verified(
         expressions = [sp.sympify(side) for side in sides if not isinstance(side, str)]
         if len(expressions) < 2:
             raise ValueError(
-                f"nothing to verify in {sides}: two sides that are not strings are needed; to print a definition, typeset()"
+                f"nothing to verify in {sides}: two sides that are not strings are needed; to "
+                f"print a definition, typeset()"
             )
         for left, right in pairwise(expressions):
             if digits is None:
                 _must_vanish(left, right, where or {})
             else:
                 _must_agree(left, right, where or {}, digits, at)
-    evidence = BY_IDENTITY if digits is None else f"to {digits} digits, at {3 if at is None else len(at)} points"
+    evidence = (
+        BY_IDENTITY
+        if digits is None
+        else f"to {digits} digits, at {3 if at is None else len(at)} points"
+    )
     mark = f"{evidence}; {how}" if how else evidence
-    told = [(BOTH, *sides) if len({str(side_lines(side, names=names)) for side in sides}) == 1 else sides for sides in given]
+    told = [
+        (BOTH, *sides)
+        if len({str(side_lines(side, names=names)) for side in sides}) == 1
+        else sides
+        for sides in given
+    ]
     if any(sides[0] == BOTH and not any(sp.flatten([sides[1]])) for sides in told):
-        raise ValueError("0 = 0 says nothing: give the sides whose difference it is, or a string that says what vanishes")
+        raise ValueError(
+            "0 = 0 says nothing: give the sides whose difference it is, or a string that says "
+            "what vanishes"
+        )
     body = _display(told, label, names)
     record = {"label": label, "latex": _block(told, names), "how": mark, "equations": len(given)}
     return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)
 
 
 def typeset(
-    *equations: Equation | str, label: str | None = None, names: Mapping[Any, str] | None = None, what: str = DEFINITION
+    *equations: Equation | str,
+    label: str | None = None,
+    names: Mapping[Any, str] | None = None,
+    what: str = DEFINITION,
 ) -> Shown:
-    """Equations that are not verified, printed as `verified` prints them; under them stands what they are."""
+    """Equations that are not verified, printed as `verified` prints them; under them stands what
+    they are."""
     given = [_sides(equation) for equation in equations]
     record = {"label": label, "latex": _block(given, names), "how": what, "equations": 0}
     return Shown(f'{_display(given, label, names)}\n\n<p class="kf-said">{what}</p>', record)
 
 
 def claim(sentence: str, *conditions: Any) -> Shown:
-    """A sentence (Markdown), printed if every condition holds; arrays hold when all their entries do.
+    """A sentence (Markdown), printed if every condition holds; arrays hold when all their entries
+    do.
 
     Raises
     ------
@@ -133,19 +155,25 @@ def claim(sentence: str, *conditions: Any) -> Shown:
     return _holds(sentence)
 
 
-def agree(sentence: str, computed: Any, expected: Any, within: float, relative: bool = True) -> Shown:
+def agree(
+    sentence: str, computed: Any, expected: Any, within: float, relative: bool = True
+) -> Shown:
     """A sentence (Markdown), printed if two arrays of numbers agree within a tolerance.
 
-    |`computed` - `expected`| <= `within` * max|`expected`|,   without the last factor if not `relative`
+    |`computed` - `expected`| <= `within` * max|`expected`|,   without the last factor if not
+    `relative`
 
     Raises
     ------
     Unverified
-        If they do not, or are not finite, or have different shapes: the sentence, and the largest difference.
+        If they do not, or are not finite, or have different shapes: the sentence, and the largest
+        difference.
     """
     computed, expected = np.asarray(computed, dtype=float), np.asarray(expected, dtype=float)
     if computed.shape != expected.shape and 1 not in (computed.size, expected.size):
-        raise Unverified(f"arrays of shapes {computed.shape} and {expected.shape} are compared: {sentence}")
+        raise Unverified(
+            f"arrays of shapes {computed.shape} and {expected.shape} are compared: {sentence}"
+        )
     difference = np.max(np.abs(computed - expected))
     bound = within * (np.max(np.abs(expected)) if relative else 1)
     if not difference <= bound:  # a NaN is no agreement
@@ -163,17 +191,23 @@ def _typeset(number: re.Match[str]) -> str:
 
 
 def _holds(sentence: str) -> Shown:
-    sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)  # as the book writes it; Python's format leaves no space
+    # as the book writes it; Python's format leaves no space
+    sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)
     parts = _NO_WORDS.split(sentence)
-    parts[::2] = (by_thousands(_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text))) for text in parts[::2])
+    parts[::2] = (
+        by_thousands(_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text))) for text in parts[::2]
+    )
     sentence = "".join(parts)
-    return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
+    return Shown(
+        f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0}
+    )
 
 
 def _sides(equation: Any) -> tuple[Side, ...]:
     if isinstance(equation, sp.logic.boolalg.BooleanAtom | bool):
         raise Unverified(
-            f"SymPy has already made this equation {equation}: nothing is left to print.  Give its sides: verified((left, right))"
+            f"SymPy has already made this equation {equation}: nothing is left to print.  Give "
+            f"its sides: verified((left, right))"
         )
     if isinstance(equation, sp.Equality):
         return equation.lhs, equation.rhs
@@ -186,36 +220,60 @@ def _must_vanish(left: Any, right: Any, where: Mapping[Any, Any]) -> None:
     rest = difference(left, right, where)
     if any(entry != 0 for entry in rest):
         remains = rest[0] if len(rest) == 1 else rest
-        raise Unverified(f"the two sides differ\n  left:  {left}\n  right: {right}\n  left - right = {remains}")
+        raise Unverified(
+            f"the two sides differ\n  left:  {left}\n  right: {right}\n  left - right = {remains}"
+        )
 
 
-def _must_agree(left: Any, right: Any, where: Mapping[Any, Any], digits: int, at: Sequence[Mapping[Any, float]] | None) -> None:
+def _must_agree(
+    left: Any,
+    right: Any,
+    where: Mapping[Any, Any],
+    digits: int,
+    at: Sequence[Mapping[Any, float]] | None,
+) -> None:
     left, right = _substituted(left, where), _substituted(right, where)
     free = sorted((left.free_symbols | right.free_symbols), key=str)
     for point in _points(free) if at is None else at:
         one, other = (sp.N(side.subs(point).doit(), digits + _GUARD) for side in (left, right))
         if not (one.is_number and other.is_number):
-            raise ValueError(f"at {point} no number is left but {one} and {other}: `at` gives every symbol a value")
-        if not abs(one - other) <= sp.Float(10) ** -digits * max(abs(one), abs(other), sp.Float(10) ** -digits):
+            raise ValueError(
+                f"at {point} no number is left but {one} and {other}: `at` gives every symbol a "
+                f"value"
+            )
+        if not abs(one - other) <= sp.Float(10) ** -digits * max(
+            abs(one), abs(other), sp.Float(10) ** -digits
+        ):
             numbers = f"the left side is {sp.N(one, digits)}, the right {sp.N(other, digits)}"
             raise Unverified(f"at {point} {numbers}\n  left:  {left}\n  right: {right}")
 
 
 def difference(left: Any, right: Any, where: Mapping[Any, Any] | None = None) -> list[sp.Expr]:
-    """left - right, entry by entry, with the symbols of `where` replaced, as simple as SymPy makes it."""
+    """left - right, entry by entry, with the symbols of `where` replaced, as simple as SymPy makes
+    it."""
     left, right = _substituted(left, where or {}), _substituted(right, where or {})
     if getattr(left, "shape", ()) != getattr(right, "shape", ()):
-        raise Unverified(f"a side of shape {getattr(left, 'shape', ())} cannot equal one of shape {getattr(right, 'shape', ())}")
+        raise Unverified(
+            f"a side of shape {getattr(left, 'shape', ())} cannot equal one of shape "
+            f"{getattr(right, 'shape', ())}"
+        )
     rest = left - right
-    return [_simple(entry) for entry in (rest.as_explicit() if hasattr(rest, "as_explicit") else [rest])]
+    return [
+        _simple(entry) for entry in (rest.as_explicit() if hasattr(rest, "as_explicit") else [rest])
+    ]
 
 
 def _substituted(side: Any, where: Mapping[Any, Any]) -> Any:
     side = sp.sympify(side)
-    matrices = {name: sp.sympify(value).as_explicit() for name, value in where.items() if isinstance(name, sp.MatrixSymbol)}
+    matrices = {
+        name: sp.sympify(value).as_explicit()
+        for name, value in where.items()
+        if isinstance(name, sp.MatrixSymbol)
+    }
     others = {name: value for name, value in where.items() if name not in matrices}
     for _ in range(len(where)):  # definitions may use each other
-        replaced = side.xreplace(matrices).subs(others, simultaneous=True)  # subs takes no matrices all at once
+        # subs takes no matrices all at once
+        replaced = side.xreplace(matrices).subs(others, simultaneous=True)
         if replaced == side:
             break
         side = replaced
@@ -230,7 +288,9 @@ def _simple(expression: sp.Expr) -> sp.Expr:
     if rest != 0:
         rest = sp.simplify(rest)
     if rest != 0 and rest.has(sp.log):
-        others, logarithms = sp.expand_log(sp.expand(rest), force=True).as_independent(sp.log, as_Add=True)
+        others, logarithms = sp.expand_log(sp.expand(rest), force=True).as_independent(
+            sp.log, as_Add=True
+        )
         if sp.simplify(sp.exp(2 * logarithms)) == 1:
             rest = sp.simplify(others)
     return rest
@@ -240,7 +300,9 @@ def _points(symbols: Sequence[sp.Symbol]) -> list[dict[sp.Symbol, sp.Rational]]:
     draw = np.random.default_rng(_SEED)
     return [
         {
-            symbol: sp.Rational(int(draw.integers(3, 30)) * (1 if symbol.is_positive else draw.choice([-1, 1])), 16)
+            symbol: sp.Rational(
+                int(draw.integers(3, 30)) * (1 if symbol.is_positive else draw.choice([-1, 1])), 16
+            )
             for symbol in symbols
         }
         for _ in range(3)
@@ -252,5 +314,7 @@ def _block(equations: Sequence[Equation], names: Mapping[Any, str] | None) -> st
     return f"\\begin{{aligned}}\n{lines}\n\\end{{aligned}}"
 
 
-def _display(equations: Sequence[Equation], label: str | None, names: Mapping[Any, str] | None) -> str:
+def _display(
+    equations: Sequence[Equation], label: str | None, names: Mapping[Any, str] | None
+) -> str:
     return f"$$\n{_block(equations, names)}\n$$" + (f" ({label})" if label else "")

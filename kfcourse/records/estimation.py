@@ -1,11 +1,14 @@
-r"""What a record says of the model itself: parameters and noise variances at which it was likeliest.
+r"""What a record says of the model itself: parameters and noise variances at which it was
+likeliest.
 
     theta = argmax ln p(y; theta),        Cov(theta) ≈ I^-1,   I = - d^2 ln p / dtheta^2  at theta
 
-I is the observed information.  A direction in which it vanishes is one that the record does not see: parameters along it may be
-changed together, and nothing measured tells.  Such a direction is named, and its standard errors are infinite.
+I is the observed information.  A direction in which it vanishes is one that the record does not
+see: parameters along it may be changed together, and nothing measured tells.  Such a direction is
+named, and its standard errors are infinite.
 
-With the normal laws of a nonlinear filter ln p is an approximation, and so is theta: its bias does not shrink with the record.
+With the normal laws of a nonlinear filter ln p is an approximation, and so is theta: its bias does
+not shrink with the record.
 """
 
 from __future__ import annotations
@@ -27,22 +30,28 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
 
-STEP = 1e-3  # of the differences that stand for derivatives, in units by which the likelihood changes by about 1
-FLAT = 0.01  # information of a parameter that is none: the likelihood of an e times larger variance differs by half of this
+# of the differences that stand for derivatives, in units by which the likelihood changes by about 1
+STEP = 1e-3
+# information of a parameter that is none: the likelihood of an e times larger variance differs by
+# half of this
+FLAT = 0.01
 DIRECTION = 0.01  # of a direction of length 1: components below are rounding of differences
-TOGETHER = 1e-5  # part of their own information that directions have left where differences cannot tell it from none
+# part of their own information that directions have left where differences cannot tell it from none
+TOGETHER = 1e-5
 
 
 class NoMaximum(ValueError):
     """The search found none; `model` is where it ended.
 
-    The likelihood of a gated filter jumps where a measurement begins to pass, and a maximum beside a jump has no derivatives.
+    The likelihood of a gated filter jumps where a measurement begins to pass, and a maximum beside
+    a jump has no derivatives.
     """
 
     def __init__(self, reason: str, model: Model, names: Sequence[str]) -> None:
         at = ", ".join(f"{name} = {float(model.parameters[name]):.6g}" for name in names)
         super().__init__(
-            f"no maximum of the likelihood was found ({reason}; last at {at}): begin nearer to it, fix a parameter, or leave out "
+            f"no maximum of the likelihood was found ({reason}; last at {at}): begin nearer to "
+            f"it, fix a parameter, or leave out "
             "the measurements that a gate refuses, in the place of the gate"
         )
         self.model = model
@@ -60,8 +69,8 @@ class Likeliest(NamedTuple):
     model : Model
         The model with these values.
     flat : tuple of str
-        What the record does not tell, one sentence for each direction; empty if it tells all.  Proportions are those of changes,
-        of positive parameters those of their logarithms.
+        What the record does not tell, one sentence for each direction; empty if it tells all.
+        Proportions are those of changes, of positive parameters those of their logarithms.
     """
 
     names: tuple[str, ...]
@@ -88,7 +97,8 @@ def estimate(
     Parameters
     ----------
     model : Model, or a table as of [variants.NAME]
-        Its values are where the search begins.  Variances are parameters too: `meter_noise={"variance": "r"}`.
+        Its values are where the search begins.  Variances are parameters too:
+        `meter_noise={"variance": "r"}`.
     y : ndarray (steps, runs, p)
         As for `run`; several runs are independent records of the same object.
     unknown : sequence of str
@@ -134,17 +144,26 @@ def estimate(
         try:
             with np.errstate(all="ignore"):
                 return -log_likelihood(t)
-        except ValueError:  # a step too far, where there is no model or no likelihood: the search takes a shorter one
+        # a step too far, where there is no model or no likelihood: the search takes a shorter one
+        except ValueError:
             return np.inf
 
-    t, unit = np.where(logs, np.log(np.where(logs, start, 1.0)), start), np.where(logs | (start == 0), 1.0, np.abs(start))
+    t, unit = (
+        np.where(logs, np.log(np.where(logs, start, 1.0)), start),
+        np.where(logs | (start == 0), 1.0, np.abs(start)),
+    )
     log_likelihood(t)  # says what is wrong with the start
     with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
-        for _ in range(1 if logs.all() else 2):  # the second time in the units that the likelihood has at its maximum
+        # the second time in the units that the likelihood has at its maximum
+        for _ in range(1 if logs.all() else 2):
             unit = _units(cost, t, unit, logs)
             t, result, information = _climb(cost, t, unit)
     best = model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
-    if not (result.success and np.isfinite(information).all() and np.linalg.eigvalsh(information).min() > -FLAT):
+    if not (
+        result.success
+        and np.isfinite(information).all()
+        and np.linalg.eigvalsh(information).min() > -FLAT
+    ):
         raise NoMaximum(result.message, best, names)
     noise = 10 * np.finfo(float).eps * abs(result.fun) / STEP**2
     variance, flat = _inverse(information, unit, names, max(TOGETHER, noise))
@@ -160,7 +179,8 @@ def profile(
     values: Sequence[float],
     positive: Sequence[str] = (),
 ) -> Array:
-    """The largest ln p(y) for given values of one parameter, (values,): over all others that are unknown.
+    """The largest ln p(y) for given values of one parameter, (values,): over all others that are
+    unknown.
 
     Where it has fallen by 1.92 from its maximum ends the 95 % interval of a long record.
     Of the normal filter; arguments and errors as of `estimate`.
@@ -179,26 +199,36 @@ def profile(
     return np.array(found)
 
 
-def _checked(model: Model, unknown: Sequence[str], positive: Sequence[str]) -> tuple[tuple[str, ...], Array, Array]:
+def _checked(
+    model: Model, unknown: Sequence[str], positive: Sequence[str]
+) -> tuple[tuple[str, ...], Array, Array]:
     """Names, whether each is positive, and values at the start."""
     names = (unknown,) if isinstance(unknown, str) else tuple(unknown)
     positive = (positive,) if isinstance(positive, str) else tuple(positive)
     if not names or len(set(names)) < len(names) or not set(names) <= set(model.parameters):
         raise ModelError(
-            f"unknown must name parameters of the model, each once: it has {', '.join(model.parameters) or 'none'}; "
+            f"unknown must name parameters of the model, each once: it has "
+            f"{', '.join(model.parameters) or 'none'}; "
             f"got {', '.join(names) or 'none'}"
         )
     if not set(positive) <= set(names):
-        raise ModelError(f"positive names {', '.join(sorted(set(positive) - set(names)))}, which is not among the unknown")
+        raise ModelError(
+            f"positive names {', '.join(sorted(set(positive) - set(names)))}, which is not among "
+            f"the unknown"
+        )
     start = np.array([float(model.parameters[name]) for name in names])
     logs = np.array([name in positive for name in names])
     if (start[logs] <= 0).any():
-        raise ModelError(f"what is positive must begin positive: {names[int(np.argmax(logs & (start <= 0)))]} is not")
+        raise ModelError(
+            f"what is positive must begin positive: {names[int(np.argmax(logs & (start <= 0)))]} "
+            f"is not"
+        )
     return names, logs, start
 
 
 def _units(cost: Callable[[Array], float], t: Array, unit: Array, logs: Array) -> Array:
-    """Changes of each parameter by which the likelihood changes by about 1; as given where none does, and of logarithms."""
+    """Changes of each parameter by which the likelihood changes by about 1; as given where none
+    does, and of logarithms."""
     here, units = cost(t), unit.copy()
     for i in np.flatnonzero(~logs):
         step = unit[i] * np.eye(len(t))[i]
@@ -212,16 +242,21 @@ def _units(cost: Callable[[Array], float], t: Array, unit: Array, logs: Array) -
 
 
 def _climb(cost: Callable[[Array], float], start: Array, unit: Array) -> tuple[Array, Any, Array]:
-    """The least cost downhill from a start, what the search says, and second derivatives in these units."""
+    """The least cost downhill from a start, what the search says, and second derivatives in these
+    units."""
 
     def scaled(c: Array) -> float:
         return cost(start + unit * c)
 
     derivatives = cache(lambda c: _derivatives(scaled, np.array(c)))
     result = scipy.optimize.minimize(
-        scaled, np.zeros(len(start)), method="trust-exact", jac=lambda c: derivatives(tuple(c))[0],
-        hess=lambda c: derivatives(tuple(c))[1], options={"gtol": max(1e-4, 1e-8 * abs(cost(start))), "maxiter": 100},
-    )  # fmt: skip
+        scaled,
+        np.zeros(len(start)),
+        method="trust-exact",
+        jac=lambda c: derivatives(tuple(c))[0],
+        hess=lambda c: derivatives(tuple(c))[1],
+        options={"gtol": max(1e-4, 1e-8 * abs(cost(start))), "maxiter": 100},
+    )
     return start + unit * result.x, result, derivatives(tuple(result.x))[1]
 
 
@@ -232,24 +267,31 @@ def _derivatives(function: Callable[[Array], float], c: Array) -> tuple[Array, A
     second = np.diag((ahead - 2 * middle + behind) / STEP**2)
     for i in range(len(c)):
         for j in range(i):
-            corners = [s * t * function(c + s * axes[i] + t * axes[j]) for s in (1, -1) for t in (1, -1)]
+            corners = [
+                s * t * function(c + s * axes[i] + t * axes[j]) for s in (1, -1) for t in (1, -1)
+            ]
             second[i, j] = second[j, i] = sum(corners) / (4 * STEP**2)
     return (ahead - behind) / (2 * STEP), second
 
 
-def _inverse(information: Array, unit: Array, names: Sequence[str], least: float) -> tuple[Array, tuple[str, ...]]:
+def _inverse(
+    information: Array, unit: Array, names: Sequence[str], least: float
+) -> tuple[Array, tuple[str, ...]]:
     """Variances of the parameters, and a sentence for each direction without information.
 
-    Each parameter's own information comes first, then that of directions of those which have some, in units of the standard
-    error that each would have if the others were known.
+    Each parameter's own information comes first, then that of directions of those which have some,
+    in units of the standard error that each would have if the others were known.
     """
     own = np.diagonal(information)
     blind = own < FLAT
     sentences = [
-        f"the record does not tell {names[i]}: its likelihood does not depend on it here" for i in np.flatnonzero(blind).tolist()
+        f"the record does not tell {names[i]}: its likelihood does not depend on it here"
+        for i in np.flatnonzero(blind).tolist()
     ]
     scale = np.sqrt(np.where(blind, 1.0, own))
-    related = np.where(blind[:, None] | blind, np.eye(len(own)), information / np.outer(scale, scale))
+    related = np.where(
+        blind[:, None] | blind, np.eye(len(own)), information / np.outer(scale, scale)
+    )
     values, directions = np.linalg.eigh(related)
     told = values > least
     variance = (directions[:, told] ** 2 / values[told]).sum(axis=1) * (unit / scale) ** 2
@@ -259,8 +301,11 @@ def _inverse(information: Array, unit: Array, names: Sequence[str], least: float
         variance[part] = np.inf
         change = direction[part] * (unit / scale)[part]
         change /= change[np.argmax(np.abs(change))]
-        together = ", ".join(f"{names[i]} ({one:+.2g})" for i, one in zip(part.tolist(), change, strict=True))
+        together = ", ".join(
+            f"{names[i]} ({one:+.2g})" for i, one in zip(part.tolist(), change, strict=True)
+        )
         sentences.append(
-            f"the record does not tell {together} apart: changed together in these proportions they leave its likelihood as it is"
+            f"the record does not tell {together} apart: changed together in these proportions "
+            f"they leave its likelihood as it is"
         )
     return variance, tuple(sentences)

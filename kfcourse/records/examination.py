@@ -1,13 +1,18 @@
 r"""All that a filter says of a record, and whether the record bears it out.
 
-If the filter is right, its innovations nu_k are normal with the covariance F_k that it expects, and independent of each other:
+If the filter is right, its innovations nu_k are normal with the covariance F_k that it expects, and
+independent of each other:
 
-    size         sum of nu^T F^-1 nu       chi-squared with as many degrees of freedom as there are numbers measured
-    mean         sum of s / sqrt(N)        N(0, 1), for the innovations s of one component over their deviations
+    size   sum of nu^T F^-1 nu
+        chi-squared with as many degrees of freedom as there are numbers measured
+    mean   sum of s / sqrt(N)
+        N(0, 1), for the innovations s of one component over their deviations
     neighbours   mean of s_j s_{j+1}       N(0, 1/(N - 1)), each s with the next one measured
 
-A gate lets pass what is small: behind it the size is that of a chi-squared number below the gate's edge.  None of this needs the
-true state.  It is what can be said of a recorded track, beside the likelihood, and what becomes of measurements held back.
+A gate lets pass what is small: behind it the size is that of a chi-squared number below the gate's
+edge.  None of this needs the
+true state.  It is what can be said of a recorded track, beside the likelihood, and what becomes of
+measurements held back.
 """
 
 from __future__ import annotations
@@ -38,7 +43,8 @@ class Examination(NamedTuple):
     Attributes
     ----------
     estimate, smoothed : Gaussian
-        Means (steps, runs, n) and covariances (steps, runs, n, n): at each step, and given the whole record.
+        Means (steps, runs, n) and covariances (steps, runs, n, n): at each step, and given the
+        whole record.
     found : Innovations
         nu (steps, runs, p), NaN where nothing was measured, and F (steps, runs, p, p).
     weight : ndarray (steps, runs)
@@ -63,7 +69,8 @@ class Examination(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """A quantity of a record beside the interval in which it lies, with a given probability, if the filter is right."""
+    """A quantity of a record beside the interval in which it lies, with a given probability, if the
+    filter is right."""
 
     name: str
     value: float
@@ -76,25 +83,29 @@ class Finding(NamedTuple):
 
 
 def examine(one: Filter, y: Array, edge: float = 1.0, by_component: bool = False) -> Examination:
-    """Run a filter over a record, look back, and keep what it expected.  A long record shows its progress.
+    """Run a filter over a record, look back, and keep what it expected.  A long record shows its
+    progress.
 
     Parameters
     ----------
     one : Filter
-        With structural functions of its own; `gated(...)` too, with its probability as `edge`, above 0 and at most 1, and
-        its `by_component`.
+        With structural functions of its own; `gated(...)` too, with its probability as `edge`,
+        above 0 and at most 1, and its `by_component`.
     y : ndarray (steps, runs, p)
         As for `run`.
 
     Raises
     ------
     ValueError
-        A filter without structural functions, an edge that is no probability, measurements of another shape, no likelihood
-        (`kfcourse.likelihood`), a noise with a negative variance, as sqrt(u) has where an input u is negative.
+        A filter without structural functions, an edge that is no probability, measurements of
+        another shape, no likelihood (`kfcourse.likelihood`), a noise with a negative variance, as
+        sqrt(u) has where an input u is negative.
     """
     expect(one, Filter, "examine")
     if not 0 < edge <= 1:
-        raise ValueError(f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}")
+        raise ValueError(
+            f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}"
+        )
     structure, y = structure_of(one, "an examination of a record"), measurements(one, y)
     visited = list(shown_progress(walk(one, y), "filter", len(y) + 1))
     innovations, F = np.empty(y.shape), np.empty((*y.shape, y.shape[-1]))
@@ -106,7 +117,9 @@ def examine(one: Filter, y: Array, edge: float = 1.0, by_component: bool = False
             noise = structure.at(k).transition(*after.posterior).Q
             _noise_of(noise, after.predicted.cov, f"the state's noise from step {k} to {k + 1}")
     passed = ~np.isnan(y)
-    weight = np.stack([getattr(state.memory, "weight", np.ones(y.shape[1])) for state in visited[1:]])
+    weight = np.stack(
+        [getattr(state.memory, "weight", np.ones(y.shape[1])) for state in visited[1:]]
+    )
     for k, state in enumerate(visited[1:]):
         passed[k] &= getattr(state.memory, "passed", weight[k][:, None] > 0)
     smoothed = looked_back(one, shown_progress(visited[1:], "looking back", len(y)), y)
@@ -128,7 +141,8 @@ def shown_progress(items: Iterable[T], what: str, total: int) -> Iterator[T]:
 
 
 def weights(one: Filter, y: Array) -> Array:
-    """How much each measurement counted, (steps, runs): 1 in full, 0 refused, NaN where it was missing.
+    """How much each measurement counted, (steps, runs): 1 in full, 0 refused, NaN where it was
+    missing.
 
     Parameters
     ----------
@@ -145,7 +159,10 @@ def weights(one: Filter, y: Array) -> Array:
     expect(one, Filter, "weights")
     memories = [state.memory for state in islice(walk(one, y), 1, None)]
     if not all(hasattr(memory, "weight") for memory in memories):
-        raise ValueError(f"{one.name} takes every measurement as it is: ask gated(one) or robust(structure) for weights")
+        raise ValueError(
+            f"{one.name} takes every measurement as it is: ask gated(one) or robust(structure) "
+            f"for weights"
+        )
     return np.stack([memory.weight for memory in memories])
 
 
@@ -153,26 +170,34 @@ def _noise_of(cov: Array, scale: Array, what: str) -> None:
     """ValueError if a variance is negative by more than a rule of quadrature rounds."""
     variance, whole = (np.diagonal(one, axis1=-2, axis2=-1) for one in (cov, scale))
     if (variance < -1e-6 * np.abs(whole)).any():
-        raise ValueError(f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the inputs there")
+        raise ValueError(
+            f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the "
+            f"inputs there"
+        )
 
 
 def normal_bound() -> float:
-    """Within so many standard deviations a normal number is with the confidence of all intervals: 1.96."""
+    """Within so many standard deviations a normal number is with the confidence of all intervals:
+    1.96."""
     return float(scipy.special.ndtri(TAILS[1]))
 
 
 def findings(told: Examination, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
-    That of the size is exact without a gate, and behind one that of a gamma law with the same mean and variance (behind one that
-    judges each component, of innovations that are not correlated with each other); the others are
-    those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are neither 0 nor 1 none of
-    this holds; nothing is found of a record that was refused altogether.
+    That of the size is exact without a gate, and behind one that of a gamma law with the same mean
+    and variance (behind one that judges each component, of innovations that are not correlated with
+    each other); the others are those of normal laws for sums of many terms: thirty measurements are
+    enough.  Under weights that are neither 0 nor 1 none of this holds; nothing is found of a record
+    that was refused altogether.
     """
     used, z = told.passed[:, run].any(axis=-1), normal_bound()
     if not used.any():
         return []
-    value, F = np.where(told.passed[used, run], told.found.value[used, run], np.nan), told.found.cov[used, run]
+    value, F = (
+        np.where(told.passed[used, run], told.found.value[used, run], np.nan),
+        told.found.cov[used, run],
+    )
     degrees = (~np.isnan(value)).sum(axis=-1)
     if told.by_component:
         size = np.nansum(value**2 / np.diagonal(F, axis1=-2, axis2=-1)) / degrees.sum()
@@ -189,8 +214,14 @@ def findings(told: Examination, run: int = 0) -> list[Finding]:
         if len(s) > 2:
             s = s / np.sqrt(np.mean(s**2))
             near = float(np.mean(s[:-1] * s[1:]))
-            result.append(Finding(f"mean{name}", float(s.mean()), -z / np.sqrt(len(s)), z / np.sqrt(len(s))))
-            result.append(Finding(f"neighbours{name}", near, -z / np.sqrt(len(s) - 1), z / np.sqrt(len(s) - 1)))
+            result.append(
+                Finding(f"mean{name}", float(s.mean()), -z / np.sqrt(len(s)), z / np.sqrt(len(s)))
+            )
+            result.append(
+                Finding(
+                    f"neighbours{name}", near, -z / np.sqrt(len(s) - 1), z / np.sqrt(len(s) - 1)
+                )
+            )
     return result
 
 
@@ -205,9 +236,11 @@ def _sizes(value: Array, F: Array) -> Array:
 
 
 def _below(degrees: Array, edge: float) -> tuple[Array, Array]:
-    """Mean and variance of chi-squared numbers, of those that lie below the quantile `edge` of their law.
+    """Mean and variance of chi-squared numbers, of those that lie below the quantile `edge` of
+    their law.
 
-    With the distribution function P_d of d degrees:  M[c; c < g] = d P_{d+2}(g),   M[c^2; c < g] = d (d + 2) P_{d+4}(g).
+    With the distribution function P_d of d degrees:  M[c; c < g] = d P_{d+2}(g),   M[c^2; c < g] =
+    d (d + 2) P_{d+4}(g).
     """
     if edge == 1:
         return degrees.astype(float), 2.0 * degrees

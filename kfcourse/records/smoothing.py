@@ -1,15 +1,18 @@
-r"""One smoother for every filter with structural functions: the past of a record, once all of it is known.
+r"""One smoother for every filter with structural functions: the past of a record, once all of it is
+known.
 
-A filter's estimate z_k uses y_0, ..., y_k.  What the measurements after it tell of x_k comes to it through x_{k+1}, and all that
-takes is Cov(x_k, x_{k+1}).  If x_k ~ N(z, p), it is p A^T with A = dtau/dz, whatever the function a: by Stein's lemma
+A filter's estimate z_k uses y_0, ..., y_k.  What the measurements after it tell of x_k comes to it
+through x_{k+1}, and all that takes is Cov(x_k, x_{k+1}).  If x_k ~ N(z, p), it is p A^T with A =
+dtau/dz, whatever the function a: by Stein's lemma
 
     M[(x - z) a(x, v)^T] = p M[da/dx]^T = p (d M[a] / dz)^T
 
-The slope of the structural function stands to the object as G = dh/dm stands to the meter.  So the smoother of Rauch, Tung and
-Striebel (`kfcourse.linear.smoothing`) is at the same time the extended, the unscented, the quadrature and the normal one.
+The slope of the structural function stands to the object as G = dh/dm stands to the meter.  So the
+smoother of Rauch, Tung and Striebel (`kfcourse.linear.smoothing`) is at the same time the extended,
+the unscented, the quadrature and the normal one.
 
-What none of them can beat is the mean of the density itself: the exact filter looks back on its nodes, and particles along their
-ancestors drawn anew (`kfcourse.filters.exact`, `particles`).
+What none of them can beat is the mean of the density itself: the exact filter looks back on its
+nodes, and particles along their ancestors drawn anew (`kfcourse.filters.exact`, `particles`).
 """
 
 from __future__ import annotations
@@ -43,22 +46,26 @@ from kfcourse.symbolic.structure import Structure
 def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     """The states given all measurements of a record: the fixed-interval smoother of a filter.
 
-    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      primes: at the next step
+    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      primes:
+    at the next step
 
     Parameters
     ----------
     one : Filter
-        Whose laws are normal: `aof`, `iterated`, `kalman_filter`; `pointmass`, which looks back exactly; `particle`.
+        Whose laws are normal: `aof`, `iterated`, `kalman_filter`; `pointmass`, which looks back
+        exactly; `particle`.
     y : ndarray (steps, runs, p)
         As for `run`; NaN where a measurement, or a component of it, is missing.
     lag : int, optional
-        Use the measurements up to so many steps later only (fixed lag): what is known with that delay.  Of the exact filter and
-        of particles that costs `lag` + 1 times as much as the whole record, as each step is looked back to for itself.
+        Use the measurements up to so many steps later only (fixed lag): what is known with that
+        delay.  Of the exact filter and of particles that costs `lag` + 1 times as much as the whole
+        record, as each step is looked back to for itself.
 
     Returns
     -------
     Gaussian
-        Estimates (steps, runs, n) and covariances (steps, runs, n, n), as of `run`; the last step's are the filter's.
+        Estimates (steps, runs, n) and covariances (steps, runs, n, n), as of `run`; the last step's
+        are the filter's.
 
     Raises
     ------
@@ -71,23 +78,26 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> from kfcourse import Model, linearised, smooth
     >>> from kfcourse.filters import aof
     >>> walk = Model.define("x + v", "x + w")
-    >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
-    [0.944, 1.833, 2.556, 3.278]
+    >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan,
+    4.0])).mean.ravel().tolist()] [0.944, 1.833, 2.556, 3.278]
     """
     expect(one, Filter, "smooth")
     return stacked([state.posterior for state in _looked_back(one, y, lag)])
 
 
 def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
-    """How far the estimates of `smooth` may be from the true means given the record, (steps, runs), in the units of x.
+    """How far the estimates of `smooth` may be from the true means given the record, (steps, runs),
+    in the units of x.
 
-    Of the exact filter the estimated error of its integrals; of particles the standard error, by the distance of two clouds that
-    know nothing of each other.  It is right to a tenth where tens of particles count at every step (`state.memory.effective`), as
-    they do where the proposal looks at the measurement.  Where fewer do, as with `guided=False` at a far measurement, both clouds
-    miss the same states: there it is a third too small.  Of two clouds it has one degree of freedom: an interval of 95 % reaches
-    12.7 standard errors (Student), not 2.  Over 400 trajectories of each kind, 400 particles, such intervals held the exact
-    smoother's components in .95 of the cases, and in .91 where fewer than 20 particles counted; the page "Particles" measures it
-    anew, and why there are not four.  Arguments as of `smooth`.
+    Of the exact filter the estimated error of its integrals; of particles the standard error, by
+    the distance of two clouds that know nothing of each other.  It is right to a tenth where tens
+    of particles count at every step (`state.memory.effective`), as they do where the proposal looks
+    at the measurement.  Where fewer do, as with `guided=False` at a far measurement, both clouds
+    miss the same states: there it is a third too small.  Of two clouds it has one degree of
+    freedom: an interval of 95 % reaches 12.7 standard errors (Student), not 2.  Over 400
+    trajectories of each kind, 400 particles, such intervals held the exact smoother's components in
+    .95 of the cases, and in .91 where fewer than 20 particles counted; the page "Particles"
+    measures it anew, and why there are not four.  Arguments as of `smooth`.
 
     Raises
     ------
@@ -116,11 +126,12 @@ def _looked_back(one: Filter, y: Array, lag: int | None) -> list[State]:
 
 
 def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:
-    """The iterated smoother: object and meter linearised again where all measurements put the states.
+    """The iterated smoother: object and meter linearised again where all measurements put the
+    states.
 
-    With `linearised(model)` each round is a step of Gauss and Newton's method towards the likeliest whole trajectory, the
-    iterated extended smoother (Bell, 1994); with the moment structures it is the iterated posterior linearisation smoother
-    (Garcia-Fernandez, Svensson, Sarkka, 2017).
+    With `linearised(model)` each round is a step of Gauss and Newton's method towards the likeliest
+    whole trajectory, the iterated extended smoother (Bell, 1994); with the moment structures it is
+    the iterated posterior linearisation smoother (Garcia-Fernandez, Svensson, Sarkka, 2017).
 
     Parameters
     ----------
@@ -142,7 +153,10 @@ def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian
     """
     expect(structure, Structure, "smooth_iterated")
     if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 1:
-        raise ValueError(f"rounds must be a whole number, at least 1 (which is smooth(aof(structure), y)); got {rounds!r}")
+        raise ValueError(
+            f"rounds must be a whole number, at least 1 (which is smooth(aof(structure), y)); got "
+            f"{rounds!r}"
+        )
     law = smooth(aof(structure), y)
     for _ in range(rounds - 1):
         law = smooth(aof(affine_at(structure, law)), y)
@@ -150,9 +164,11 @@ def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian
 
 
 def affine_at(structure: Structure, laws: Gaussian) -> Structure:
-    """The affine object and meter that the structural functions describe at given laws, one for each step and run.
+    """The affine object and meter that the structural functions describe at given laws, one for
+    each step and run.
 
-    x' = tau + A (x - z) + q,  Cov(q) = Q;     y = h + G (x - z) + r,  Cov(r) = R;       all at the law N(z, p) of that step
+    x' = tau + A (x - z) + q,  Cov(q) = Q;     y = h + G (x - z) + r,  Cov(r) = R;       all at the
+    law N(z, p) of that step
     """
     model = structure.model
 
@@ -165,9 +181,13 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
             return Gaussian(tau + shift, symmetric(product(product(A, p), transpose(A))) + Q)
 
         def measure(m: Array, d: Array) -> Measurement:
-            return measurement_of(model.angles.y)(*seen_from(now.measure(*there), there, Gaussian(m, d), model.angles.x))
+            return measurement_of(model.angles.y)(
+                *seen_from(now.measure(*there), there, Gaussian(m, d), model.angles.x)
+            )
 
         return Structure(structure.name, model, predict, measure, lambda z, p: Transition(A, Q))
 
     first = at(0)
-    return Structure(structure.name, model, first.predict, first.measure, first.transition, at_step=at)
+    return Structure(
+        structure.name, model, first.predict, first.measure, first.transition, at_step=at
+    )

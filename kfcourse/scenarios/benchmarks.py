@@ -3,15 +3,20 @@
 pendulum()               Särkkä and Svensson (2023), with their data: `pendulum_data()`
 car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
-cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and Borisov)
+cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and
+Borisov)
 lorenz(noise)            the attractor of Lorenz (1963), and measurements of it: `lorenz_data(...)`
 stochastic_volatility()  a state that shows only in the measurement's variance
-bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
-reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a radar
+bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its
+course: `bearings_data(...)`
+reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a
+radar
 passing_target(angles)   a target whose bearing jumps by a turn
-exact_mul(a, b), double_well(a, b, s)   two of Jimenez's objects in continuous time, with his data: `jimenez_data(name)`
+exact_mul(a, b), double_well(a, b, s)   two of Jimenez's objects in continuous time, with his data:
+`jimenez_data(name)`
 benes(interval, r)       the object in continuous time whose filter is known exactly (Benes, 1981)
-local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970 (Cobb, 1978): `nile()`
+local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970 (Cobb, 1978):
+`nile()`
 """
 
 from __future__ import annotations
@@ -32,7 +37,8 @@ from kfcourse.symbolic.model import Model
 DATA = resources.files("kfcourse.scenarios") / "data"
 MODELS = tomllib.loads((DATA / "benchmarks.toml").read_text(encoding="utf-8"))
 
-# Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's notebooks print them.
+# Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's
+# notebooks print them.
 PENDULUM_ERRORS = {
     "EKF": 0.16830859061153763,
     "UKF": 0.09524392125923083,
@@ -44,25 +50,34 @@ PENDULUM_ERRORS = {
 # And of the position of the car over its 100 steps.
 CAR_ERRORS = {"measurements": 0.7679855237247215, "Kalman": 0.4253824660526518}
 
-# Mean square errors on the growth model with a state noise of variance one, 100 runs of 500 steps: those that Hartikainen,
-# Solin and Särkkä (2011) print, and those computed with other programs.
+# Mean square errors on the growth model with a state noise of variance one, 100 runs of 500 steps:
+# those that Hartikainen, Solin and Särkkä (2011) print, and those computed with other programs.
 GROWTH_ERRORS = {"EKF": 125.9, "cubature": 72.3, "Gauss-Hermite 10": 40.9, "particles": 10.2}
-GROWTH_ELSEWHERE = {"EKF": 115.8, "Gauss-Hermite 5": 59.2, "Gauss-Hermite 10": 41.4, "particles": 10.05}
+GROWTH_ELSEWHERE = {
+    "EKF": 115.8,
+    "Gauss-Hermite 5": 59.2,
+    "Gauss-Hermite 10": 41.4,
+    "particles": 10.05,
+}
 
-# From the same manual: root mean square errors of the position, means over runs.  Bearings of 1000 runs; re-entry, km, of 100.
+# From the same manual: root mean square errors of the position, means over runs.  Bearings of 1000
+# runs; re-entry, km, of 100.
 BEARINGS_ERRORS = {"EKF": 0.114, "UKF": 0.113}
 REENTRY_ERRORS = {"EKF": 0.0084, "UKF": 0.0084}
 
-# Of the cubic sensor, once it has settled: read from the curves that Pankov, Bosov and Borisov publish.
+# Of the cubic sensor, once it has settled: read from the curves that Pankov, Bosov and Borisov
+# publish.
 CUBIC_SENSOR = {"error variance": 0.356, "state variance": 1.155}
 
-# Of the Lorenz attractor, root mean square errors after a measurement: those that the DAPPER package states for Sakov's settings.
-# The ensemble filter has ten members, the particle filter four thousand.
+# Of the Lorenz attractor, root mean square errors after a measurement: those that the DAPPER
+# package states for Sakov's settings. The ensemble filter has ten members, the particle filter four
+# thousand.
 LORENZ_ERRORS = {"EKF": 0.92, "ensemble filter": 0.60, "particles": 0.27}
 LORENZ_EVERY = 25  # steps between measurements
 
-# Log likelihoods as Jimenez's toolbox SdeEstimation prints them, (1/2) ln 2 pi less than the sum over all innovations but the
-# first, with the estimates to which they belong: of a and b by exact moments, of a, b and s by the normal law's.
+# Log likelihoods as Jimenez's toolbox SdeEstimation prints them, (1/2) ln 2 pi less than the sum
+# over all innovations but the first, with the estimates to which they belong: of a and b by exact
+# moments, of a, b and s by the normal law's.
 EXACT_MUL = (-0.099611, 0.114830, 17.209)
 DOUBLE_WELL = (-0.9677, 0.083952, 2.2758, -874.0219)
 
@@ -77,21 +92,24 @@ def _model(name: str, **changes: Any) -> Model:
 
 
 def _wander(dt: float) -> Array:
-    """Covariance of position and velocity that a white acceleration of intensity one makes in dt."""
+    """Covariance of position and velocity that a white acceleration of intensity one makes in
+    dt."""
     return np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
 
 
 def pendulum() -> Model:
-    """The angle and angular velocity of a pendulum, x1' = x1 + dt x2, x2' = x2 - g dt sin(x1), y = sin(x1); noises added.
+    """The angle and angular velocity of a pendulum, x1' = x1 + dt x2, x2' = x2 - g dt sin(x1), y =
+    sin(x1); noises added.
 
-    The law N(0, I) is that before the first prediction: filters of this package, which correct first, need a missing
-    measurement before the data.
+    The law N(0, I) is that before the first prediction: filters of this package, which correct
+    first, need a missing measurement before the data.
     """
     return _model("pendulum", state_noise={"variance": 0.01 * _wander(0.01)})
 
 
 def pendulum_data() -> tuple[Array, Array]:
-    """States (500, 2) and measurements (501, 1, 1) of the book's simulation; the first measurement is missing (NaN)."""
+    """States (500, 2) and measurements (501, 1, 1) of the book's simulation; the first measurement
+    is missing (NaN)."""
     return _simulation("pendulum")
 
 
@@ -104,7 +122,8 @@ def car() -> Model:
 
 
 def car_data() -> tuple[Array, Array]:
-    """States (100, 4) and measurements (101, 1, 2) of the book's simulation; the first measurement is missing (NaN)."""
+    """States (100, 4) and measurements (101, 1, 2) of the book's simulation; the first measurement
+    is missing (NaN)."""
     return _simulation("car_track")
 
 
@@ -116,7 +135,8 @@ def _simulation(name: str) -> tuple[Array, Array]:
 
 
 def growth_model(variance: float = 1) -> Model:
-    """x' = x/2 + 25 x/(1 + x^2) + 8 cos(1.2 k) + v,  y = x^2/20 + w;  x_0 ~ N(0, 5), w ~ N(0, 1), v of this variance."""
+    """x' = x/2 + 25 x/(1 + x^2) + 8 cos(1.2 k) + v,  y = x^2/20 + w;  x_0 ~ N(0, 5), w ~ N(0, 1), v
+    of this variance."""
     return _model("growth_model", state_noise={"variance": variance})
 
 
@@ -136,9 +156,11 @@ def inverse_cube_root() -> Model:
 
 
 def lorenz(noise: float) -> Model:
-    """x1' = 10(x2 - x1), x2' = 28 x1 - x2 - x1 x3, x3' = x1 x2 - 8/3 x3 over .01 by Heun's rule, + noise v; y = x + sqrt(2) w.
+    """x1' = 10(x2 - x1), x2' = 28 x1 - x2 - x1 x3, x3' = x1 x2 - 8/3 x3 over .01 by Heun's rule, +
+    noise v; y = x + sqrt(2) w.
 
-    The attractor has no noise; a filter needs some, or it becomes sure of itself and loses what runs apart.
+    The attractor has no noise; a filter needs some, or it becomes sure of itself and loses what
+    runs apart.
     """
 
     def slope(x: str, y: str, z: str) -> tuple[str, str, str]:
@@ -148,7 +170,10 @@ def lorenz(noise: float) -> Model:
     first = slope(*state)
     second = slope(*(f"{x} + T*({k})" for x, k in zip(state, first, strict=True)))
     return Model.define(
-        [f"{x} + T/2*({k} + {m}) + s*v{i}" for i, x, k, m in zip((1, 2, 3), state, first, second, strict=True)],
+        [
+            f"{x} + T/2*({k} + {m}) + s*v{i}"
+            for i, x, k, m in zip((1, 2, 3), state, first, second, strict=True)
+        ],
         [f"{x} + sqrt(2)*w{i}" for i, x in zip((1, 2, 3), state, strict=True)],
         {"T": 0.01, "s": noise},
         prior={"mean": [1.509, -1.531, 25.46], "variance": [2, 2, 2]},
@@ -156,7 +181,8 @@ def lorenz(noise: float) -> Model:
 
 
 def lorenz_data(runs: int, measured: int, seed: int) -> tuple[Array, Array]:
-    """Trajectories of the attractor, x (25 measured + 1, runs, 3), and y, which is NaN but at every 25th step from the 25th."""
+    """Trajectories of the attractor, x (25 measured + 1, runs, 3), and y, which is NaN but at every
+    25th step from the 25th."""
     x, y = simulate(lorenz(0), runs, LORENZ_EVERY * measured + 1, seed)
     seen = np.zeros((len(y), 1, 1), dtype=bool)
     seen[LORENZ_EVERY::LORENZ_EVERY] = True
@@ -165,7 +191,12 @@ def lorenz_data(runs: int, measured: int, seed: int) -> tuple[Array, Array]:
 
 def stochastic_volatility() -> Model:
     """x' = 0.95 x + 0.25 v,  y = exp(x/2) w: the measurement has mean zero whatever the state."""
-    return Model.define("a*x + s*v", "exp(x/2)*w", {"a": 0.95, "s": 0.25}, prior={"mean": 0, "variance": 0.25**2 / (1 - 0.95**2)})
+    return Model.define(
+        "a*x + s*v",
+        "exp(x/2)*w",
+        {"a": 0.95, "s": 0.25},
+        prior={"mean": 0, "variance": 0.25**2 / (1 - 0.95**2)},
+    )
 
 
 def bearings() -> Model:
@@ -178,9 +209,11 @@ def bearings() -> Model:
 
 
 def bearings_data(runs: int, seed: int | np.random.Generator) -> tuple[Array, Array]:
-    """Courses (500, runs, 2) with three turns of 90 degrees, and measurements (501, runs, 2), the first of them missing.
+    """Courses (500, runs, 2) with three turns of 90 degrees, and measurements (501, runs, 2), the
+    first of them missing.
 
-    The courses do not come from the model: speed 1, and a turn rate of pi/2 in 0.51 s, with an error of 0.01 a step.
+    The courses do not come from the model: speed 1, and a turn rate of pi/2 in 0.51 s, with an
+    error of 0.01 a step.
     """
     expect_sizes(runs=runs)
     rng, dt = np.random.default_rng(seed), 0.01
@@ -191,17 +224,21 @@ def bearings_data(runs: int, seed: int | np.random.Generator) -> tuple[Array, Ar
     turned = -rate * dt
     direction = np.cumsum(turned, axis=0) - turned / 2
     chord = dt * np.sinc(turned / (2 * np.pi))
-    x = np.cumsum(chord[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1), axis=0)
+    x = np.cumsum(
+        chord[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1), axis=0
+    )
     seen = [np.arctan2(x[..., 1] - y, x[..., 0] - x0) for x0, y in ((-1, -2), (1, 1))]
     noisy = np.stack(seen, axis=-1) + 0.05 * rng.standard_normal((500, runs, 2))
     return x, np.concatenate([np.full((1, runs, 2), np.nan), noisy])
 
 
 def reentry(known: bool) -> Model:
-    """A vehicle under drag and gravity (km, s), its range and bearing measured; Euler's scheme with 0.1 s.
+    """A vehicle under drag and gravity (km, s), its range and bearing measured; Euler's scheme with
+    0.1 s.
 
-    x5 is the logarithm of the ballistic coefficient over b0.  It is 0.6932; known, as the trajectories are simulated, or
-    for the filters N(0, 1).  As of `pendulum`, the law is that before the first prediction.
+    x5 is the logarithm of the ballistic coefficient over b0.  It is 0.6932; known, as the
+    trajectories are simulated, or for the filters N(0, 1).  As of `pendulum`, the law is that
+    before the first prediction.
     """
     drag = "b0*exp(x5 + (R0 - sqrt(x1**2 + x2**2))/H0)*sqrt(x3**2 + x4**2)"
     gravity = "mu/(x1**2 + x2**2)**(3/2)"
@@ -216,14 +253,18 @@ def reentry(known: bool) -> Model:
         ["sqrt((x1 - R0)**2 + x2**2) + w1", "atan2(x2, x1 - R0) + w2"],
         {"T": 0.1, "b0": -0.59783, "H0": 13.406, "mu": 3.986e5, "R0": 6374},
         angles=["y2"],
-        prior={"mean": [6500.4, 349.14, -1.8093, -6.7967, 0.6932 * known], "variance": [1e-6] * 4 + [0 if known else 1]},
+        prior={
+            "mean": [6500.4, 349.14, -1.8093, -6.7967, 0.6932 * known],
+            "variance": [1e-6] * 4 + [0 if known else 1],
+        },
         state_noise={"variance": [2.4064e-5, 2.4064e-5, 0 if known else 1e-6]},
         meter_noise={"variance": [1e-6, 0.17e-3**2]},
     )
 
 
 def passing_target(angles: list[str]) -> Model:
-    """A target 10 km west of a radar, flying south: its bearing, y2, jumps from pi to -pi after about 20 s."""
+    """A target 10 km west of a radar, flying south: its bearing, y2, jumps from pi to -pi after
+    about 20 s."""
     return _model("passing_target", angles=angles)
 
 
@@ -239,17 +280,30 @@ def nile() -> Array:
 
 
 def jimenez_data(name: str) -> tuple[Array, Array]:
-    """Instants (steps,) and measurements (steps, 1, 1) of "exact-mul" or "double-well"; licence: data/LICENSE-jimenez.txt."""
-    t, y = np.loadtxt((DATA / f"jimenez-{name}.csv").open(encoding="utf-8"), delimiter=",", skiprows=1).T
+    """Instants (steps,) and measurements (steps, 1, 1) of "exact-mul" or "double-well"; licence:
+    data/LICENSE-jimenez.txt."""
+    t, y = np.loadtxt(
+        (DATA / f"jimenez-{name}.csv").open(encoding="utf-8"), delimiter=",", skiprows=1
+    ).T
     return t, y[:, None, None]
 
 
 def exact_mul(a: float, b: float, **options: Any) -> Model:
-    """dx = a t x dt + b sqrt(t) x dw, x(0.5) = 1, y = x + w with variance 1e-4 at his instants: its moments are known exactly."""
+    """dx = a t x dt + b sqrt(t) x dw, x(0.5) = 1, y = x + w with variance 1e-4 at his instants: its
+    moments are known exactly."""
     instants = jimenez_data("exact-mul")[0].tolist()
     noise, prior = {"variance": 1e-4}, {"mean": 1, "variance": 0}
     values = {"a": a, "b": b}
-    return sampled("a*t*x", "b*sqrt(t)*x", "x + w", values, instants=instants, prior=prior, meter_noise=noise, **options)
+    return sampled(
+        "a*t*x",
+        "b*sqrt(t)*x",
+        "x + w",
+        values,
+        instants=instants,
+        prior=prior,
+        meter_noise=noise,
+        **options,
+    )
 
 
 def double_well(a: float, b: float, s: float, **options: Any) -> Model:
@@ -259,6 +313,9 @@ def double_well(a: float, b: float, s: float, **options: Any) -> Model:
 
 
 def benes(interval: float = 0.2, r: float = 0.1, **options: Any) -> Model:
-    """dx = tanh(x) dt + dw, x(0) = 0.1, y = x + w with variance r: as Sarkka and Solin (2019) have it, but for a known start."""
+    """dx = tanh(x) dt + dw, x(0) = 0.1, y = x + w with variance r: as Sarkka and Solin (2019) have
+    it, but for a known start."""
     noise, prior = {"variance": r}, {"mean": 0.1, "variance": 0}
-    return sampled("tanh(x)", "1", "x + w", interval=interval, prior=prior, meter_noise=noise, **options)
+    return sampled(
+        "tanh(x)", "1", "x + w", interval=interval, prior=prior, meter_noise=noise, **options
+    )

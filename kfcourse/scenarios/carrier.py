@@ -1,9 +1,11 @@
 """A carrier of known frequency and unknown phase, for the loops that track it.
 
-State (theta, phi, nu): the known phase of the carrier, the unknown phase in rad, which wanders, and the frequency offset in
-rad/s, which wanders too and makes the phase drift.  With N samples a period, T seconds apart:
+State (theta, phi, nu): the known phase of the carrier, the unknown phase in rad, which wanders, and
+the frequency offset in rad/s, which wanders too and makes the phase drift.  With N samples a
+period, T seconds apart:
 
-    theta' = theta + 2 pi / N,    phi' = phi + T nu + s_phi v_1,    nu' = nu + s_nu v_2,    y = A cos(theta + phi) + sigma w
+    theta' = theta + 2 pi / N,   phi' = phi + T nu + s_phi v_1,   nu' = nu + s_nu v_2,
+    y = A cos(theta + phi) + sigma w
 """
 
 from __future__ import annotations
@@ -17,7 +19,10 @@ PARAMETERS = {"A": 1, "sigma": 1, "N": 8, "T": 1 / 8000, "s_phi": 0.03, "s_nu": 
 
 
 def phase_meter(
-    order: int = 2, mean: Sequence[float] = (0, 0, 0), variance: Sequence[float] = (0, 0.1, 60**2), **changes: float
+    order: int = 2,
+    mean: Sequence[float] = (0, 0, 0),
+    variance: Sequence[float] = (0, 0.1, 60**2),
+    **changes: float,
 ) -> Model:
     """The model above; of order 1 it has no frequency offset.
 

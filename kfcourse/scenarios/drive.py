@@ -1,6 +1,8 @@
-"""A drive through Dresden, recorded by Paul Balzer on 26 March 2014: a satellite receiver at 10 Hz, a yaw rate at 50 Hz.
+"""A drive through Dresden, recorded by Paul Balzer on 26 March 2014: a satellite receiver at 10 Hz,
+a yaw rate at 50 Hz.
 
-The data are his, under CC BY-SA 2.0: data/LICENSE-car-2014-03-26.txt.  There is no truth beside them.
+The data are his, under CC BY-SA 2.0: data/LICENSE-car-2014-03-26.txt.  There is no truth beside
+them.
 """
 
 from __future__ import annotations
@@ -44,11 +46,18 @@ class Drive(NamedTuple):
 def recorded() -> Drive:
     """The whole record.
 
-    x = r cos(phi_0) (lambda - lambda_0),   y = r (phi - phi_0)       latitude phi, longitude lambda, in rad
+    x = r cos(phi_0) (lambda - lambda_0),   y = r (phi - phi_0)       latitude phi, longitude
+    lambda, in rad
     """
-    text = (resources.files("kfcourse.scenarios") / "data" / "car-2014-03-26.csv").read_text(encoding="utf-8")
+    text = (resources.files("kfcourse.scenarios") / "data" / "car-2014-03-26.csv").read_text(
+        encoding="utf-8"
+    )
     names, *rows = (line.split(",") for line in text.splitlines())
-    table = dict(zip(names, np.array([[float(cell or "nan") for cell in row] for row in rows]).T, strict=True))
+    table = dict(
+        zip(
+            names, np.array([[float(cell or "nan") for cell in row] for row in rows]).T, strict=True
+        )
+    )
     latitude, longitude = np.radians(table["latitude_deg"]), np.radians(table["longitude_deg"])
     east = RADIUS * np.cos(latitude[0]) * (longitude - longitude[0])
     course = np.pi / 2 - np.radians(table["course_deg"])
@@ -70,7 +79,8 @@ def fixes(every: int = 1) -> tuple[Array, Array]:
 
 
 def turned(times: Array) -> Array:
-    """The angle by which the car has turned since the record began, rad: the integral of the yaw rate, each reading held.
+    """The angle by which the car has turned since the record began, rad: the integral of the yaw
+    rate, each reading held.
 
     Before the record it is 0, and after its end what it was there.
     """

@@ -11,8 +11,9 @@ from kfcourse.montecarlo.statistics import Estimate, ratio
 def rms_by_part(error: Array, part: Array) -> Estimate:
     """Root mean square length of the error in each part, with standard errors.
 
-    For a run, the mean over the steps of the part of |e|^2; then the root of its mean over the runs.  The runs are independent,
-    the steps of a run are not: the standard error comes from the scatter of the runs.
+    For a run, the mean over the steps of the part of |e|^2; then the root of its mean over the
+    runs.  The runs are independent, the steps of a run are not: the standard error comes from the
+    scatter of the runs.
 
     Parameters
     ----------
@@ -25,10 +26,13 @@ def rms_by_part(error: Array, part: Array) -> Estimate:
 
 
 def rms_difference(error: Array, other: Array, part: Array) -> Estimate:
-    """RMS of `error` less that of `other` by part, as `rms_by_part`, on common runs: the standard error is of the pair."""
+    """RMS of `error` less that of `other` by part, as `rms_by_part`, on common runs: the standard
+    error is of the pair."""
     ours, theirs = _by_part(error, part), _by_part(other, part)
     if ours.shape != theirs.shape:
-        raise ValueError(f"both errors must be of the same runs, got {ours.shape[1]} and {theirs.shape[1]}")
+        raise ValueError(
+            f"both errors must be of the same runs, got {ours.shape[1]} and {theirs.shape[1]}"
+        )
     first, second = (np.sqrt(squares.mean(axis=1)) for squares in (ours, theirs))
     influence = _influence(ours, first) - _influence(theirs, second)  # both from the same run
     return Estimate(first - second, _standard_error(influence), ours.shape[1] - 1)
@@ -37,7 +41,9 @@ def rms_difference(error: Array, other: Array, part: Array) -> Estimate:
 def _by_part(error: Array, part: Array) -> Array:
     """Mean square length by part and run, (parts, runs)."""
     if error.ndim != 3 or len(error) != len(part):
-        raise ValueError(f"errors must have the shape ({len(part)}, runs, components), got {error.shape}")
+        raise ValueError(
+            f"errors must have the shape ({len(part)}, runs, components), got {error.shape}"
+        )
     if error.shape[1] < 2:
         raise ValueError("a standard error needs at least 2 runs")
     square = (error**2).sum(axis=-1)

@@ -8,12 +8,14 @@ The flight has five parts, as in the paper that the radar chapters reproduce:
     4  on a circle of larger radius, descending
     5  descending, straight
 
-The axes are x east, y north, z up, with the radar in the origin; the heading is counted from x towards y.  Speed V, turn rate
-omega and vertical speed are given functions of time, and the rest follows:
+The axes are x east, y north, z up, with the radar in the origin; the heading is counted from x
+towards y.  Speed V, turn rate omega and vertical speed are given functions of time, and the rest
+follows:
 
     (x', y') = V (cos psi, sin psi),   psi' = omega
 
-Between the parts these functions change along the step 3 u^2 - 2 u^3, so position, velocity and acceleration are continuous.
+Between the parts these functions change along the step 3 u^2 - 2 u^3, so position, velocity and
+acceleration are continuous.
 """
 
 from __future__ import annotations
@@ -93,34 +95,46 @@ def aircraft(
     Returns
     -------
     Track
-        Velocity, acceleration and altitude in closed form; the horizontal position by Gauss's rule, exact to rounding.
+        Velocity, acceleration and altitude in closed form; the horizontal position by Gauss's rule,
+        exact to rounding.
 
     Raises
     ------
     ValueError
-        A number that is not finite or has the wrong sign, a manoeuvre shorter than its two ramps, a flight that ends below
-        the ground.
+        A number that is not finite or has the wrong sign, a manoeuvre shorter than its two ramps, a
+        flight that ends below the ground.
     """
     _numbers("start", start, 3)
     _numbers("turns", turns, 2)
     _numbers("heading and descent", (heading, descent), 2)
-    for name, given, size in (("speeds", speeds, 2), ("radii", radii, 2), ("durations", durations, 3)):
+    for name, given, size in (
+        ("speeds", speeds, 2),
+        ("radii", radii, 2),
+        ("durations", durations, 3),
+    ):
         _numbers(name, given, size)
         expect_positive(**{name: min(given)})
     expect_positive(interval=interval, ramp=ramp)
 
-    circles = [abs(angle) * radius / speed for angle, radius, speed in zip(turns, radii, speeds, strict=True)]
+    circles = [
+        abs(angle) * radius / speed
+        for angle, radius, speed in zip(turns, radii, speeds, strict=True)
+    ]
     lengths = [durations[0], circles[0] + ramp, durations[1], circles[1] + ramp, durations[2]]
     for number, length in zip((2, 3, 4, 5), lengths[1:], strict=True):
         if length < 2 * ramp:
             raise ValueError(
-                f"part {number} lasts {length:.4g} s, less than its two ramps of {ramp:g} s; make it longer or the ramp shorter"
+                f"part {number} lasts {length:.4g} s, less than its two ramps of {ramp:g} s; make "
+                f"it longer or the ramp shorter"
             )
     ends = np.cumsum(lengths)
     time = interval * np.arange(int(ends[-1] / interval * (1 + 1e-12)) + 1)
 
     # Turn rates and the loss of speed: each rises, stays and falls inside its part.
-    rates = [np.sign(angle) * speed / radius for angle, speed, radius in zip(turns, speeds, radii, strict=True)]
+    rates = [
+        np.sign(angle) * speed / radius
+        for angle, speed, radius in zip(turns, speeds, radii, strict=True)
+    ]
     deceleration = (speeds[0] - speeds[1]) / (lengths[2] - ramp)
 
     def speed_and_heading(t: Array) -> tuple[Array, Array]:
@@ -129,7 +143,9 @@ def aircraft(
         return speed, heading + rates[0] * first + rates[1] * second
 
     speed, psi = speed_and_heading(time)
-    turn_rate = rates[0] * _plateau(time, ends[0], ends[1], ramp) + rates[1] * _plateau(time, ends[2], ends[3], ramp)
+    turn_rate = rates[0] * _plateau(time, ends[0], ends[1], ramp) + rates[1] * _plateau(
+        time, ends[2], ends[3], ramp
+    )
     slowing = -deceleration * _plateau(time, ends[1], ends[2], ramp)
     since = (time - ends[2]) / ramp  # the descent begins with part 4 and goes on
     forward = np.stack([np.cos(psi), np.sin(psi)], axis=-1)
@@ -138,7 +154,8 @@ def aircraft(
     altitude = start[2] - descent * ramp * _step_integral(since)
     if altitude.min() <= 0:
         raise ValueError(
-            f"the aircraft would end at the altitude {altitude[-1]:.4g} m; start higher, lower `descent` or shorten parts 4 and 5"
+            f"the aircraft would end at the altitude {altitude[-1]:.4g} m; start higher, lower "
+            f"`descent` or shorten parts 4 and 5"
         )
     knots = np.concatenate([ends[:-1], ends[:-1] + ramp, ends[1:-1] - ramp])
     path = _path(time, knots, speed_and_heading)
@@ -182,7 +199,8 @@ def _plateau_integral(t: Array, start: float, end: float, ramp: float) -> Array:
 
 
 def _path(time: Array, knots: Array, speed_and_heading) -> Array:
-    """The integral of V (cos psi, sin psi) from 0 to each moment, (steps, 2), by Gauss's rule on pieces that end at the knots."""
+    """The integral of V (cos psi, sin psi) from 0 to each moment, (steps, 2), by Gauss's rule on
+    pieces that end at the knots."""
     inside = knots[knots < time[-1]]
     moments = np.unique(np.concatenate([time, inside, np.arange(0.0, time[-1], PIECE)]))
     middle, half = (moments[1:] + moments[:-1]) / 2, np.diff(moments) / 2

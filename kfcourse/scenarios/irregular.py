@@ -1,7 +1,9 @@
-"""A track as it is recorded: fixes of a place in the plane at unequal intervals, some missing, some grossly wrong.
+"""A track as it is recorded: fixes of a place in the plane at unequal intervals, some missing, some
+grossly wrong.
 
-x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis, pushed by white acceleration of intensity q
-y_k = `position` + w_k,           w_k ~ N(0, sigma^2);    an outlier has `times` that deviation
+x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis, pushed by white acceleration
+of intensity q y_k = `position` + w_k,           w_k ~ N(0, sigma^2);    an outlier has `times` that
+deviation
 """
 
 from __future__ import annotations
@@ -48,7 +50,8 @@ def irregular_track(
     outliers: float = 0.05,
     times: float = 20.0,
 ) -> IrregularTrack:
-    """Tracks of unequal intervals, 0.1 to 1.5 s, of whose fixes a part is missing and a part grossly wrong.
+    """Tracks of unequal intervals, 0.1 to 1.5 s, of whose fixes a part is missing and a part
+    grossly wrong.
 
     Parameters
     ----------
@@ -57,7 +60,8 @@ def irregular_track(
         Records with the same times.
     steps : int
     missing, outliers : float
-        The share of the fixes that is missing, and of the others that is grossly wrong: between 0 and 1.
+        The share of the fixes that is missing, and of the others that is grossly wrong: between 0
+        and 1.
     times : float
         How many times larger an outlier's errors are, on the average.
 

@@ -1,20 +1,22 @@
 """A pointer moved by hand: its track, and the fourth-order filter that cleans it.
 
-The state is (x, y, vx, vy) in pixels and pixels a second.  Between samples the motion is uniformly accelerated, and the
-acceleration is the filter's known input u = (ax, ay):
+The state is (x, y, vx, vy) in pixels and pixels a second.  Between samples the motion is uniformly
+accelerated, and the acceleration is the filter's known input u = (ax, ay):
 
     x_{k+1} = A x_k + B (u_k + xi_k),   xi ~ N(0, `acceleration_sd`^2 I)
     y_k     = H x_k + w_k,              w  ~ N(0, `measurement_sd`^2 I)
 
-A hand moves in strokes.  One stroke from rest to rest that changes its acceleration as smoothly as possible (Flash and
-Hogan, 1985) goes along s(tau) = 10 tau^3 - 15 tau^4 + 6 tau^5, and takes the longer the farther it goes (Fitts' law).
+A hand moves in strokes.  One stroke from rest to rest that changes its acceleration as smoothly as
+possible (Flash and Hogan, 1985) goes along s(tau) = 10 tau^3 - 15 tau^4 + 6 tau^5, and takes the
+longer the farther it goes (Fitts' law).
 
 ::
 
     track = hand_track(seed=1)                                 the true motion, at any moment
     samples = sample(track, interval=0.01, measurement_sd=8, runs=200, seed=2)
     system = uniform_acceleration(0.01, acceleration_sd=3000, measurement_sd=8)
-    laws = follow(system, samples.y, interval=0.01)            start-up from three samples, then the Kalman filter
+    laws = follow(system, samples.y, interval=0.01)
+        start-up from three samples, then the Kalman filter
 """
 
 from __future__ import annotations
@@ -40,13 +42,18 @@ TRANSITION = sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([[1, DT], [0, 1]]
 INPUT = sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([DT**2 / 2, DT]), _AXES))
 SENSITIVITY = sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([[1, 0]]), _AXES))
 
-# Position, velocity and acceleration at the last of three samples (r0, r1, r2), by the parabola through them.
-START = sp.ImmutableMatrix([[0, 0, 1], sp.Matrix([[1, -4, 3]]) / (2 * DT), sp.Matrix([[1, -2, 1]]) / DT**2])
+# Position, velocity and acceleration at the last of three samples (r0, r1, r2), by the parabola
+# through them.
+START = sp.ImmutableMatrix(
+    [[0, 0, 1], sp.Matrix([[1, -4, 3]]) / (2 * DT), sp.Matrix([[1, -2, 1]]) / DT**2]
+)
 
 MINIMUM_JERK = Polynomial([0, 0, 0, 10, -15, 6])
 
 
-def uniform_acceleration(interval: float, acceleration_sd: float, measurement_sd: float) -> LinearSystem:
+def uniform_acceleration(
+    interval: float, acceleration_sd: float, measurement_sd: float
+) -> LinearSystem:
     """The filter's model for samples every `interval` seconds.
 
     A and B of uniformly accelerated motion, Q = acceleration_sd^2 B B^T, R = measurement_sd^2 I.
@@ -56,7 +63,8 @@ def uniform_acceleration(interval: float, acceleration_sd: float, measurement_sd
     interval : float
         Seconds between samples.
     acceleration_sd : float
-        Standard deviation of what the input does not say about the acceleration, constant between samples, px/s^2.
+        Standard deviation of what the input does not say about the acceleration, constant between
+        samples, px/s^2.
     measurement_sd : float
         Standard deviation of the noise of each coordinate, px.
     """
@@ -68,10 +76,12 @@ def uniform_acceleration(interval: float, acceleration_sd: float, measurement_sd
 
 
 def start_up(y: Array, interval: float, R: Array) -> Gaussian:
-    """Position, velocity and acceleration at the third of three samples, and the covariance of their errors.
+    """Position, velocity and acceleration at the third of three samples, and the covariance of
+    their errors.
 
-    The parabola through the samples is a linear function of them, M = `START`: with noise of covariance R, independent from
-    sample to sample, the covariance is (M M^T) (x) R, (x) the Kronecker product.
+    The parabola through the samples is a linear function of them, M = `START`: with noise of
+    covariance R, independent from sample to sample, the covariance is (M M^T) (x) R, (x) the
+    Kronecker product.
 
     Parameters
     ----------
@@ -93,18 +103,24 @@ def start_up(y: Array, interval: float, R: Array) -> Gaussian:
     """
     expect_positive(interval=interval)
     if y.ndim != 3 or (y.shape[0], y.shape[2]) != (3, 2):
-        raise ValueError(f"the start-up takes three samples of two coordinates, (3, runs, 2); got {y.shape}")
+        raise ValueError(
+            f"the start-up takes three samples of two coordinates, (3, runs, 2); got {y.shape}"
+        )
     if not np.isfinite(y).all():
-        raise ValueError("a sample of the start-up is missing; wait for three complete samples in a row")
+        raise ValueError(
+            "a sample of the start-up is missing; wait for three complete samples in a row"
+        )
     M = _numeric(START, interval)
     mean = np.einsum("ij,jra->ria", M, y).reshape(y.shape[1], 6)
     return Gaussian(mean, np.kron(M @ M.T, R))
 
 
 def acceleration_from(y: Array, interval: float) -> Array:
-    """Acceleration by the last three samples, (steps, runs, 2) -> (steps, runs, 2); NaN for the first two.
+    """Acceleration by the last three samples, (steps, runs, 2) -> (steps, runs, 2); NaN for the
+    first two.
 
-    (y_k - 2 y_{k-1} + y_{k-2}) / interval^2, the last row of `START`.  Its noise has the variance 6 R / interval^4.
+    (y_k - 2 y_{k-1} + y_{k-2}) / interval^2, the last row of `START`.  Its noise has the variance 6
+    R / interval^4.
     """
     expect_positive(interval=interval)
     if len(y) < 3:
@@ -134,7 +150,8 @@ def follow(
     interval : float
         Seconds between samples.
     u : ndarray (steps, runs, 2) or (steps, 1, 2), optional
-        Acceleration between y[k] and y[k+1]; u[0] and u[1] are not used.  None: no input, the acceleration is all noise.
+        Acceleration between y[k] and y[k+1]; u[0] and u[1] are not used.  None: no input, the
+        acceleration is all noise.
     start : Gaussian, optional
         Law of (x, y, vx, vy) at the third sample, in place of that from `start_up`.
     arithmetic : str
@@ -143,17 +160,25 @@ def follow(
     Returns
     -------
     Run
-        Laws for samples 3, 4, ... (the first three are used up): posterior.mean is (steps - 3, runs, 4).
+        Laws for samples 3, 4, ... (the first three are used up): posterior.mean is (steps - 3,
+        runs, 4).
     """
     if len(y) < 4:
-        raise ValueError(f"the filter is ready after three samples and needs more to filter; got {len(y)}")
+        raise ValueError(
+            f"the filter is ready after three samples and needs more to filter; got {len(y)}"
+        )
     if not np.isclose(system.A[0, 2], interval, rtol=1e-9, atol=0):
-        raise ValueError(f"the system was made for an interval of {system.A[0, 2]:g} s, and the samples have {interval:g} s")
+        raise ValueError(
+            f"the system was made for an interval of {system.A[0, 2]:g} s, and the samples have "
+            f"{interval:g} s"
+        )
     if start is None:
         mean, cov = start_up(y[:3], interval, system.R)
         start = Gaussian(mean[:, :4], cov[:4, :4])
     shift = system.input(None if u is None else u[2])
-    return run(system, predict_law(system, start, shift), y[3:], None if u is None else u[3:], arithmetic)
+    return run(
+        system, predict_law(system, start, shift), y[3:], None if u is None else u[3:], arithmetic
+    )
 
 
 class Motion(NamedTuple):
@@ -195,20 +220,26 @@ class HandTrack:
         tau = np.clip(tau, 0.0, 1.0)
         position = self.origin + MINIMUM_JERK(tau) @ self.displacement
         velocity, acceleration = (
-            np.where(moving, MINIMUM_JERK.deriv(order)(tau) / self.duration**order, 0.0) @ self.displacement for order in (1, 2)
+            np.where(moving, MINIMUM_JERK.deriv(order)(tau) / self.duration**order, 0.0)
+            @ self.displacement
+            for order in (1, 2)
         )
         return Motion(position, velocity, acceleration)
 
 
-# Strokes: at least SHORTEST px; FITTS[0] + FITTS[1] log2(distance / FITTS[2] + 1) seconds (MacKenzie, 1992, with a target of
-# 20 px); the next begins up to OVERLAP of the stroke's duration before its end, or up to PAUSE seconds after it.
-# An overlap of 0.4 keeps the strokes in order (0.4 of a stroke of 3500 px is the duration of the shortest), and with it the
-# path between its targets, on the screen.
+# Strokes: at least SHORTEST px; FITTS[0] + FITTS[1] log2(distance / FITTS[2] + 1) seconds
+# (MacKenzie, 1992, with a target of 20 px); the next begins up to OVERLAP of the stroke's duration
+# before its end, or up to PAUSE seconds after it. An overlap of 0.4 keeps the strokes in order (0.4
+# of a stroke of 3500 px is the duration of the shortest), and with it the path between its targets,
+# on the screen.
 SHORTEST, FITTS, OVERLAP, PAUSE = 100.0, (0.1, 0.15, 20.0), 0.4, 0.3
 
 
-def hand_track(seed: int | np.random.Generator, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)) -> HandTrack:
-    """A track like that of a hand: strokes between random targets on a screen, with pauses and overlaps.
+def hand_track(
+    seed: int | np.random.Generator, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)
+) -> HandTrack:
+    """A track like that of a hand: strokes between random targets on a screen, with pauses and
+    overlaps.
 
     Parameters
     ----------
@@ -220,7 +251,10 @@ def hand_track(seed: int | np.random.Generator, strokes: int = 14, screen: tuple
     """
     expect_sizes(strokes=strokes)
     if not min(screen) >= 2 * SHORTEST or not np.isfinite(screen).all():
-        raise ValueError(f"strokes are at least {SHORTEST:g} px long: the screen must have twice that, got {screen}")
+        raise ValueError(
+            f"strokes are at least {SHORTEST:g} px long: the screen must have twice that, got "
+            f"{screen}"
+        )
     rng = np.random.default_rng(seed)
     targets = [rng.uniform(0, screen)]
     while len(targets) <= strokes:
@@ -229,7 +263,11 @@ def hand_track(seed: int | np.random.Generator, strokes: int = 14, screen: tuple
             targets.append(target)
     displacement = np.diff(targets, axis=0)
     duration = FITTS[0] + FITTS[1] * np.log2(np.hypot(*displacement.T) / FITTS[2] + 1)
-    gap = np.where(rng.random(strokes) < 0.5, -OVERLAP * duration * rng.random(strokes), PAUSE * rng.random(strokes))
+    gap = np.where(
+        rng.random(strokes) < 0.5,
+        -OVERLAP * duration * rng.random(strokes),
+        PAUSE * rng.random(strokes),
+    )
     begin = np.concatenate([[0.0], np.cumsum(duration + gap)[:-1]])
     return HandTrack(targets[0], begin, duration, displacement)
 
@@ -244,7 +282,8 @@ class Samples(NamedTuple):
     state : ndarray (steps, 1, 4)
         True (x, y, vx, vy).
     input : ndarray (steps, 1, 2)
-        Mean acceleration until the next sample, (v_{k+1} - v_k) / interval, which an ideal accelerometer would give.
+        Mean acceleration until the next sample, (v_{k+1} - v_k) / interval, which an ideal
+        accelerometer would give.
     y : ndarray (steps, runs, 2)
         Noisy positions.
     """
@@ -255,8 +294,15 @@ class Samples(NamedTuple):
     y: Array
 
 
-def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: int | np.random.Generator) -> Samples:
-    """The track every `interval` seconds from its start to its end, with `runs` realisations of white noise added."""
+def sample(
+    track: HandTrack,
+    interval: float,
+    measurement_sd: float,
+    runs: int,
+    seed: int | np.random.Generator,
+) -> Samples:
+    """The track every `interval` seconds from its start to its end, with `runs` realisations of
+    white noise added."""
     expect_positive(interval=interval)
     expect_sizes(runs=runs)
     expect_not_negative(measurement_sd=measurement_sd)

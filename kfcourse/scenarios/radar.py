@@ -1,4 +1,5 @@
-"""What a radar measures of an aircraft: range and angles or Cartesian coordinates, with normal errors; its tracking models."""
+"""What a radar measures of an aircraft: range and angles or Cartesian coordinates, with normal
+errors; its tracking models."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from kfcourse.symbolic.model import Model
 X, Y, Z = symbol("x"), symbol("y"), symbol("z")
 RANGE, AZIMUTH, ELEVATION = symbol("r"), symbol("varphi"), symbol("epsilon")
 
-# Range, azimuth from the x axis towards y in (-pi, pi], elevation above the horizon; and the way back.
+# Range, azimuth from the x axis towards y in (-pi, pi], elevation above the horizon; and the way
+# back.
 SPHERICAL = sp.ImmutableMatrix(
     [sp.sqrt(X**2 + Y**2 + Z**2), sp.atan2(Y, X), sp.atan2(Z, sp.sqrt(X**2 + Y**2))],
 )
@@ -50,7 +52,8 @@ def spherical(position: Array) -> Array:
 
 
 def cartesian(measured: Array) -> Array:
-    """Positions (..., 3) in m of range (m), azimuth and elevation (rad): `CARTESIAN`, the inverse of `spherical`."""
+    """Positions (..., 3) in m of range (m), azimuth and elevation (rad): `CARTESIAN`, the inverse
+    of `spherical`."""
     return _to_cartesian(_of_three(measured))[0]
 
 
@@ -61,7 +64,9 @@ def _of_three(vector: Array) -> Array:
     return vector
 
 
-def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+def measure_cartesian(
+    track: Track, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator
+) -> Array:
     """The position with independent normal errors on the three axes.
 
     Parameters
@@ -80,7 +85,9 @@ def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, 
     return _noisy(track.position, sigmas, runs, seed)
 
 
-def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+def measure_spherical(
+    track: Track, sigmas: Sequence[float], runs: int, seed: int | np.random.Generator
+) -> Array:
     """Range, azimuth and elevation with independent normal errors, (steps, runs, 3).
 
     Parameters
@@ -91,15 +98,20 @@ def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: in
     runs, seed
         As in `measure_cartesian`.
 
-    The azimuth lies between -pi and pi, so it jumps where the flight crosses the negative x axis: a model of these
-    measurements needs `angles=["y2"]`.
+    The azimuth lies between -pi and pi, so it jumps where the flight crosses the negative x axis: a
+    model of these measurements needs `angles=["y2"]`.
     """
     if np.ndim(sigmas) == 0:
-        raise ValueError(f"a range is in m and angles in rad: sigmas must be three, (range, azimuth, elevation), got {sigmas!r}")
+        raise ValueError(
+            f"a range is in m and angles in rad: sigmas must be three, (range, azimuth, "
+            f"elevation), got {sigmas!r}"
+        )
     return on_circle(_noisy(spherical(track.position), sigmas, runs, seed), (1,))
 
 
-def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+def _noisy(
+    true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator
+) -> Array:
     try:
         deviations = np.broadcast_to(np.asarray(sigmas, dtype=float), (3,))
     except (TypeError, ValueError):
@@ -122,7 +134,8 @@ def kinematic(
 ) -> Model:
     """Motion with a highest derivative that changes at random, its position measured.
 
-    order 1: velocity nearly constant.  The acceleration v_k is constant over an interval T, and independent of the last:
+    order 1: velocity nearly constant.  The acceleration v_k is constant over an interval T, and
+    independent of the last:
 
         r' = r + T s + T^2/2 v,   s' = s + T v
 
@@ -144,7 +157,9 @@ def kinematic(
         Law of the first state, as in `Model.define`.
     """
     if dimensions not in (1, 2, 3) or order not in (1, 2):
-        raise ValueError(f"dimensions must be 1, 2 or 3 and order 1 or 2, got {dimensions} and {order}")
+        raise ValueError(
+            f"dimensions must be 1, 2 or 3 and order 1 or 2, got {dimensions} and {order}"
+        )
     expect_positive(interval=interval)
     expect_not_negative(noise_sd=noise_sd, measurement_sd=measurement_sd)
     axes = "xyz"[:dimensions]
@@ -152,7 +167,9 @@ def kinematic(
     T, state = symbol("T"), [symbol(name) for name in names]
     noises = [symbol(f"v{i + 1}") for i in range(dimensions)]
     r, s = state[:dimensions], state[dimensions : 2 * dimensions]
-    acceleration = [a + v for a, v in zip(state[2 * dimensions :] or [0] * dimensions, noises, strict=True)]
+    acceleration = [
+        a + v for a, v in zip(state[2 * dimensions :] or [0] * dimensions, noises, strict=True)
+    ]
     equations = [
         *(ri + T * si + T**2 / 2 * ai for ri, si, ai in zip(r, s, acceleration, strict=True)),
         *(si + T * ai for si, ai in zip(s, acceleration, strict=True)),

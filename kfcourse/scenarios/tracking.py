@@ -1,6 +1,8 @@
-"""The Kalman filter that tracks a flight in the radar chapters: its start, and a control made of the last three measurements.
+"""The Kalman filter that tracks a flight in the radar chapters: its start, and a control made of
+the last three measurements.
 
-lambda_{k+1} = A z_k + B u_k,   u_k = (y_k - 2 y_{k-1} + y_{k-2}) / T^2,   B = (T^2/2, T) on each axis
+lambda_{k+1} = A z_k + B u_k,   u_k = (y_k - 2 y_{k-1} + y_{k-2}) / T^2,   B = (T^2/2, T) on each
+axis
 """
 
 from __future__ import annotations
@@ -14,11 +16,17 @@ from kfcourse.scenarios.pointer import acceleration_from
 from kfcourse.scenarios.radar import kinematic
 
 
-def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: int, seed: int | np.random.Generator) -> Gaussian:
+def roughly_known(
+    system: LinearSystem,
+    first_gain: float,
+    state: Array,
+    runs: int,
+    seed: int | np.random.Generator,
+) -> Gaussian:
     """A law of the first state with which the filter's first gain of the position is `first_gain`.
 
-    One measurement gave the position, something else the speed, known to sigma_s on each axis; then one prediction,
-    Psi_0 = A diag(sigma^2, sigma_s^2) A^T + Q.
+    One measurement gave the position, something else the speed, known to sigma_s on each axis; then
+    one prediction, Psi_0 = A diag(sigma^2, sigma_s^2) A^T + Q.
 
     Parameters
     ----------
@@ -39,18 +47,22 @@ def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: i
     Raises
     ------
     ValueError
-        No speed is known so well that the first gain is so small; or it is not below one.  A system of another order.
+        No speed is known so well that the first gain is so small; or it is not below one.  A system
+        of another order.
     """
     axes = len(system.H)
     if np.shape(state) != (len(system.A),) or len(system.A) != 2 * axes:
         raise ValueError(
-            f"expected positions and speeds of {axes} axes, kinematic(..., order=1), and a state ({2 * axes},); "
+            f"expected positions and speeds of {axes} axes, kinematic(..., order=1), and a state "
+            f"({2 * axes},); "
             f"got a system of {len(system.A)} components and a state {np.shape(state)}"
         )
     T, variance = system.A[0, axes], system.R[0, 0]
     least = 1 - variance / (2 * variance + system.Q[0, 0])  # with a speed that is known exactly
     if not least <= first_gain < 1:
-        raise ValueError(f"after one measurement the first gain lies between {least:.4g} and 1, got {first_gain}")
+        raise ValueError(
+            f"after one measurement the first gain lies between {least:.4g} and 1, got {first_gain}"
+        )
     position = variance * first_gain / (1 - first_gain)
     speed = (position - variance - system.Q[0, 0]) / T**2
     known = np.diag([variance] * axes + [speed] * axes)
@@ -60,9 +72,15 @@ def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: i
 
 
 def kalman_positions(
-    y: Array, interval: float, noise_sd: float, measurement_sd: float, start: Gaussian, control: bool = False
+    y: Array,
+    interval: float,
+    noise_sd: float,
+    measurement_sd: float,
+    start: Gaussian,
+    control: bool = False,
 ) -> Array:
-    """Positions (steps, runs, 3) by the Kalman filter of `kinematic`, with the control u_k of the measurements or without.
+    """Positions (steps, runs, 3) by the Kalman filter of `kinematic`, with the control u_k of the
+    measurements or without.
 
     Parameters
     ----------
@@ -82,4 +100,6 @@ def kalman_positions(
         return run(free, start, y).posterior.mean[..., :3]
     B = np.kron([[interval**2 / 2], [interval]], np.eye(3))
     driven = LinearSystem(free.A, free.H, free.Q, free.R, B)
-    return run(driven, start, y, np.nan_to_num(acceleration_from(y, interval))).posterior.mean[..., :3]
+    return run(driven, start, y, np.nan_to_num(acceleration_from(y, interval))).posterior.mean[
+        ..., :3
+    ]

@@ -14,7 +14,8 @@ from kfcourse.symbolic.reading import ModelError, Names, shown
 
 
 class AngleWarning(UserWarning):
-    """A formula finds or contains an angle, and the model does not say that it is one; or an angle seems to be in degrees."""
+    """A formula finds or contains an angle, and the model does not say that it is one; or an angle
+    seems to be in degrees."""
 
 
 def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list[str]) -> Angles:
@@ -22,7 +23,9 @@ def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list
     known = {"x": x, "y": y}
     if isinstance(given, Mapping):
         if set(given) - set(known):
-            raise ModelError(f"`angles` has the keys x and y, not {', '.join(map(str, set(given) - set(known)))}")
+            raise ModelError(
+                f"`angles` has the keys x and y, not {', '.join(map(str, set(given) - set(known)))}"
+            )
         chosen = {key: _names(names) for key, names in given.items()}
     else:
         names = [] if given is None else _names(given)
@@ -35,8 +38,16 @@ def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list
         chosen["y"] += [name for name in names if name not in x + y]
     for key, names in chosen.items():
         if unknown := [name for name in names if name not in known[key]]:
-            raise ModelError(f"`angles` names {', '.join(map(str, unknown))}; components are {', '.join(x)} and {', '.join(y)}")
-    return Angles(*(tuple(i for i, name in enumerate(known[key]) if name in chosen.get(key, ())) for key in known))
+            raise ModelError(
+                f"`angles` names {', '.join(map(str, unknown))}; components are {', '.join(x)} "
+                f"and {', '.join(y)}"
+            )
+    return Angles(
+        *(
+            tuple(i for i, name in enumerate(known[key]) if name in chosen.get(key, ()))
+            for key in known
+        )
+    )
 
 
 def _names(given: Any) -> list[str]:
@@ -44,7 +55,8 @@ def _names(given: Any) -> list[str]:
     names = [given] if isinstance(given, str) else given
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
         raise ModelError(
-            f'`angles` must name components, as in ["y2"] or {{x = ["psi"]}}, got {shown(given)}; leave it out if there is none'
+            f'`angles` must name components, as in ["y2"] or {{x = ["psi"]}}, got {shown(given)}; '
+            f"leave it out if there is none"
         )
     return [*names]
 
@@ -53,20 +65,24 @@ def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:
     """AngleWarning for components that are circular by atan2 and may pass from pi to -pi."""
     if circular := [name for name, equation in equations.items() if _jumps(equation)]:
         _warn(
-            f"{' and '.join(circular)}: atan2 jumps from pi to -pi, and a filter takes the jump for an innovation of a turn; "
-            f"say angles=[{_quoted(circular)}], or angles=[] if it is no angle or never comes near pi"
+            f"{' and '.join(circular)}: atan2 jumps from pi to -pi, and a filter takes the jump "
+            f"for an innovation of a turn; "
+            f"say angles=[{_quoted(circular)}], or angles=[] if it is no angle or never comes "
+            f"near pi"
         )
 
 
 def warn_of_meters(measured: Mapping[str, sp.Expr], angles: Angles, x: Sequence[sp.Symbol]) -> None:
-    """AngleWarning for measurements that contain an angle as it is, and are not said to be angles themselves."""
+    """AngleWarning for measurements that contain an angle as it is, and are not said to be angles
+    themselves."""
     turning = [x[i] for i in angles.x]
     for i, (name, equation) in enumerate(measured.items()):
         plain = [symbol for symbol in turning if _outside_sines(equation, symbol)]
         if plain and i not in angles.y:
             state = _quoted([symbol.name for symbol in turning])
             _warn(
-                f"{name} contains the angle {plain[0]}, which jumps from pi to -pi, outside sin and cos: say "
+                f"{name} contains the angle {plain[0]}, which jumps from pi to -pi, outside sin "
+                f"and cos: say "
                 f'angles={{"x": [{state}], "y": ["{name}"]}}, or "y": [] if it is no angle'
             )
 
@@ -77,7 +93,8 @@ def warn_of_degrees(what: str, values: Any, names: Sequence[str], angles: Compon
         beyond = np.nanmax(np.abs(np.asarray(values, dtype=float)[..., i]), initial=0.0)
         if beyond > 2 * np.pi:
             _warn(
-                f"{what} of the angle {names[i]} is {beyond:.6g}, beyond 2 pi: angles are in radians; "
+                f"{what} of the angle {names[i]} is {beyond:.6g}, beyond 2 pi: angles are in "
+                f"radians; "
                 "turn degrees into them by numpy.deg2rad"
             )
 
@@ -98,7 +115,8 @@ def _outside_sines(formula: sp.Expr, angle: sp.Symbol) -> bool:
 
 
 def _jumps(formula: sp.Expr) -> bool:
-    """Whether an atan2 in it may pass from pi to -pi: not of a point to the right, nor inside a sine."""
+    """Whether an atan2 in it may pass from pi to -pi: not of a point to the right, nor inside a
+    sine."""
     if isinstance(formula, sp.sin | sp.cos | sp.tan):
         return False
     if isinstance(formula, sp.atan2) and not formula.args[1].is_nonnegative:

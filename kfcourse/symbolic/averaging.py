@@ -1,11 +1,15 @@
-r"""A model that jumps, averaged over its modes: what a filter that knows of no modes may take for the model.
+r"""A model that jumps, averaged over its modes: what a filter that knows of no modes may take for
+the model.
 
-With the probabilities q_j of the modes before anything is measured, and N(z, p) or N(m, d) in every one of them,
+With the probabilities q_j of the modes before anything is measured, and N(z, p) or N(m, d) in every
+one of them,
 
-    tau = sum q_j tau_j,    Theta = sum q_j [Theta_j + (tau_j - tau)(tau_j - tau)^T],     and so h, F;    G = sum q_j G_j
+    tau = sum q_j tau_j,   Theta = sum q_j [Theta_j + (tau_j - tau)(tau_j - tau)^T],   and so h, F;
+        G = sum q_j G_j
 
-are the moments of the next state and of the measurement: the mode is one noise more.  Where the modes are drawn anew at each step
-nothing is lost but the shape of that noise; where they last, all that the past tells of the mode is lost.
+are the moments of the next state and of the measurement: the mode is one noise more.  Where the
+modes are drawn anew at each step nothing is lost but the shape of that noise; where they last, all
+that the past tells of the mode is lost.
 """
 
 from __future__ import annotations
@@ -23,7 +27,8 @@ from kfcourse.symbolic.structure import Structure, expect_each, of_steps
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
-    """The structural functions averaged over the modes, from those of each, such as [gaussian(mode) for mode in model.modes].
+    """The structural functions averaged over the modes, from those of each, such as [gaussian(mode)
+    for mode in model.modes].
 
     Raises
     ------
@@ -35,7 +40,10 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     _check(model)
     expect_each(structures, "averaged")
     if len(structures) != len(model.modes):
-        raise ValueError(f"averaged expects a structure for each of the {len(model.modes)} modes, got {len(structures)}")
+        raise ValueError(
+            f"averaged expects a structure for each of the {len(model.modes)} modes, got "
+            f"{len(structures)}"
+        )
 
     def at(k: int) -> Structure:
         before, after = model.law_at(k), model.law_at(k + 1)
@@ -48,14 +56,25 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
 
         def measure(m: Array, d: Array) -> Measurement:
             parts = [part.measure(m, d) for part in now]
-            h, G = _mean(before, [part.h for part in parts]), _mean(before, [part.G for part in parts])
-            R = _mean(before, [part.R + _form(part.G - G, d) + _square(part.h - h) for part in parts])
+            h, G = (
+                _mean(before, [part.h for part in parts]),
+                _mean(before, [part.G for part in parts]),
+            )
+            R = _mean(
+                before, [part.R + _form(part.G - G, d) + _square(part.h - h) for part in parts]
+            )
             return Measurement(h, G, _form(G, d) + R, R)
 
         def transition(z: Array, p: Array) -> Transition:
-            each, taus = [structure.transition(z, p) for structure in now], [structure.predict(z, p).mean for structure in now]
+            each, taus = (
+                [structure.transition(z, p) for structure in now],
+                [structure.predict(z, p).mean for structure in now],
+            )
             tau, A = _mean(after, taus), _mean(after, [part.A for part in each])
-            parts = [Q + _form(slope - A, p) + _square(mean - tau) for (slope, Q), mean in zip(each, taus, strict=True)]
+            parts = [
+                Q + _form(slope - A, p) + _square(mean - tau)
+                for (slope, Q), mean in zip(each, taus, strict=True)
+            ]
             return Transition(A, _mean(after, parts))
 
         return Structure("averaged", model.modes[0], predict, measure, transition)
@@ -64,7 +83,8 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
 
 
 def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
-    """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j; errors as of `averaged`."""
+    """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j;
+    errors as of `averaged`."""
     _check(model)
     each = [compile_noiseless(mode) for mode in model.modes]
 
@@ -75,7 +95,9 @@ def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
         )
 
     def meter(x: Array, k: int | None = None) -> Array:
-        return sum(q * equation(x, k) for q, (_, equation) in zip(model.law_at(k or 0), each, strict=True))
+        return sum(
+            q * equation(x, k) for q, (_, equation) in zip(model.law_at(k or 0), each, strict=True)
+        )
 
     return state, meter
 
@@ -84,7 +106,10 @@ def _check(model: JumpModel) -> None:
     expect(model, JumpModel, "the average over the modes")
     model.without_state("the average over the modes")
     if model.angles.x or model.angles.y:
-        raise ModelError("components that are angles have no average over modes; take filters that know the modes")
+        raise ModelError(
+            "components that are angles have no average over modes; take filters that know the "
+            "modes"
+        )
 
 
 def _mean(weights: Array, values: list[Array]) -> Array:

@@ -1,4 +1,5 @@
-"""SymPy expressions as NumPy functions over the ensemble, by `sympy.lambdify`: the only place where formulas become code."""
+"""SymPy expressions as NumPy functions over the ensemble, by `sympy.lambdify`: the only place where
+formulas become code."""
 
 from __future__ import annotations
 
@@ -44,26 +45,31 @@ def compile_function(
     arguments : dict
         Argument name to the matrix of symbols that the argument holds.
     outputs : dict
-        Output name to the matrix of expressions; the function returns them as a tuple in this order.
+        Output name to the matrix of expressions; the function returns them as a tuple in this
+        order.
     vectors : sequence of str
         Arguments and outputs that are vectors (..., n); the others are matrices (..., r, c).
 
     Returns
     -------
     Compiled
-        `function(*arrays)`: leading axes broadcast.  A vector has those of all arguments, a matrix those of the arguments that
-        enter the matrix, and what no argument enters has none.
+        `function(*arrays)`: leading axes broadcast.  A vector has those of all arguments, a matrix
+        those of the arguments that enter the matrix, and what no argument enters has none.
 
     Raises
     ------
     ModelError
         No real number, a number beyond floats, a symbol that is no argument.
     """
-    matrices = (tuple((key, sp.ImmutableMatrix(m)) for key, m in given.items()) for given in (arguments, outputs))
+    matrices = (
+        tuple((key, sp.ImmutableMatrix(m)) for key, m in given.items())
+        for given in (arguments, outputs)
+    )
     return _compiled(name, *matrices, tuple(vectors))
 
 
-@lru_cache(maxsize=256)  # the modes of a model, and models that differ in one noise, share an equation
+# the modes of a model, and models that differ in one noise, share an equation
+@lru_cache(maxsize=256)
 def _compiled(
     name: str,
     arguments: tuple[tuple[str, sp.ImmutableMatrix], ...],
@@ -89,24 +95,34 @@ def _compiled(
     used = set().union(*(matrix.free_symbols for matrix in varying))
     taken = [place for place in places.values() if place[0] in used]
     entries = [_in_floats(entry) for matrix in varying for entry in matrix if not entry.is_number]
-    formulas = sp.lambdify([symbol for symbol, *_ in taken], entries, ["scipy", "numpy"], cse=_shared)
+    formulas = sp.lambdify(
+        [symbol for symbol, *_ in taken], entries, ["scipy", "numpy"], cse=_shared
+    )
     assembled = [_assembler(matrix, key in vectors, arguments) for key, matrix in outputs]
 
     def function(*arrays: Array) -> tuple[Array, ...]:
         values = iter(formulas(*(arrays[number][(..., *index)] for _, number, index in taken)))
-        leads = [array.shape[: -1 if key in vectors else -2] for array, (key, _) in zip(arrays, arguments, strict=True)]
+        leads = [
+            array.shape[: -1 if key in vectors else -2]
+            for array, (key, _) in zip(arrays, arguments, strict=True)
+        ]
         return tuple(assemble(values, leads) for assemble in assembled)
 
     return Compiled(function, inspect.getsource(formulas).replace("_lambdifygenerated", name))
 
 
 def _in_floats(expression: sp.Expr) -> sp.Expr:
-    """With floats for fractions of numbers that a 64-bit integer does not hold: NumPy would take these for objects."""
-    large = [number for number in expression.atoms(sp.Rational) if max(abs(number.p), number.q) > 2**53]
+    """With floats for fractions of numbers that a 64-bit integer does not hold: NumPy would take
+    these for objects."""
+    large = [
+        number for number in expression.atoms(sp.Rational) if max(abs(number.p), number.q) > 2**53
+    ]
     return expression.xreplace({number: sp.Float(number, 17) for number in large})
 
 
-def _shared(expressions: Sequence[sp.Expr]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
+def _shared(
+    expressions: Sequence[sp.Expr],
+) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
     """Common subexpressions, and small integer powers as products."""
     assignments, reduced = sp.cse(expressions, symbols=sp.numbered_symbols("s"), list=False)
     return [(name, _as_products(e)) for name, e in assignments], [_as_products(e) for e in reduced]
@@ -116,13 +132,16 @@ def check_numbers(name: str, matrix: sp.MatrixBase) -> None:
     """ModelError if expressions hold what is no real number, or a number beyond floats."""
     if matrix.has(*NO_NUMBERS):
         raise ModelError(
-            f"{name}: no finite real value, as at the mean of a noise something is divided by 0, or the root of a negative "
-            "number taken; use unscented(model) or gauss_hermite(model), or another mean of the noise"
+            f"{name}: no finite real value, as at the mean of a noise something is divided by 0, "
+            f"or the root of a negative "
+            "number taken; use unscented(model) or gauss_hermite(model), or another mean of the "
+            "noise"
         )
     for number in matrix.atoms(sp.Rational, sp.Float):
         if number and not 2.0**-1022 <= abs(number) < 2**1023:
             raise ModelError(
-                f"the derived functions hold the number {sp.N(number, 3)!s}, beyond what a float can be; change the units"
+                f"the derived functions hold the number {sp.N(number, 3)!s}, beyond what a float "
+                f"can be; change the units"
             )
 
 
@@ -137,14 +156,20 @@ def _assembler(
     for index, entry in zip(indices, matrix, strict=True):
         constant[index] = float(entry) if entry.is_number else 0.0
     varying = [index for index, entry in zip(indices, matrix, strict=True) if not entry.is_number]
-    enter = [number for number, (_, m) in enumerate(arguments) if is_vector or m.free_symbols & matrix.free_symbols]
+    enter = [
+        number
+        for number, (_, m) in enumerate(arguments)
+        if is_vector or m.free_symbols & matrix.free_symbols
+    ]
 
     def assemble(values: Any, leads: list[tuple[int, ...]]) -> Array:
         if not varying:
             return constant.copy()
         if len(indices) == 1:  # no copy of the one component
             return np.asarray(next(values))[(..., *(None for _ in constant.shape))]
-        result = np.empty(np.broadcast_shapes(*(leads[number] for number in enter)) + constant.shape)
+        result = np.empty(
+            np.broadcast_shapes(*(leads[number] for number in enter)) + constant.shape
+        )
         if len(varying) < len(indices):
             result[...] = constant
         for index in varying:

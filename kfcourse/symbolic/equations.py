@@ -14,13 +14,15 @@ from kfcourse.symbolic.reading import exact_matrix
 
 
 class Equation(Protocol):
-    """a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends on the step, at step k."""
+    """a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends
+    on the step, at step k."""
 
     def __call__(self, x: Array, noise: Array, k: int | None = None) -> Array: ...
 
 
 class Noiseless(Protocol):
-    """a(x, m_v) or b(x, m_w), x (..., n) -> (..., n) or (..., p); of a model that depends on the step, at step k."""
+    """a(x, m_v) or b(x, m_w), x (..., n) -> (..., n) or (..., p); of a model that depends on the
+    step, at step k."""
 
     def __call__(self, x: Array, k: int | None = None) -> Array: ...
 
@@ -38,18 +40,25 @@ def compile_model(model: Model) -> tuple[Equation, Equation]:
 
 
 def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
-    """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (..., n), (..., p)."""
-    meter_equation = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
+    """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (...,
+    n), (..., p)."""
+    meter_equation = model.meter_equation.subs(
+        dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))
+    )
     meter = _compiled("meter", meter_equation, {"x": model.x}, model)
     if model.between is not None:
         motion, still = model.between.motion(model), np.zeros(len(model.v))
         return lambda x, k=None: motion(x, still, k), lambda x, k=None: meter.at(k)(x)[0]
-    state_equation = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
+    state_equation = model.state_equation.subs(
+        dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True))
+    )
     state = _compiled("state", state_equation, {"x": model.x}, model)
     return lambda x, k=None: state.at(k)(x)[0], lambda x, k=None: meter.at(k)(x)[0]
 
 
-def _compiled(name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model) -> Stepwise:
+def _compiled(
+    name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model
+) -> Stepwise:
     matrices = {key: sp.Matrix(symbols) for key, symbols in arguments.items()}
     numeric = equation.subs(model.values)
     return Stepwise.compile(model.known, name, matrices, {name: numeric}, [*arguments, name])

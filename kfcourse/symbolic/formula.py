@@ -22,9 +22,11 @@ from sympy.logic.boolalg import Boolean
 
 NAMES = "sin cos tan atan atan2 exp log sqrt tanh sinh cosh Abs sign Heaviside"
 FUNCTIONS = {name: getattr(sp, name) for name in NAMES.split()} | {"abs": sp.Abs}
-ARGUMENTS = {"atan2": 2}  # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
+# how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
+ARGUMENTS = {"atan2": 2}
 CONSTANTS = {"pi": sp.pi}
-PIECEWISE = "Piecewise"  # Piecewise((x, x < 1), (1, True)), which may also be typed as x if x < 1 else 1
+# Piecewise((x, x < 1), (1, True)), which may also be typed as x if x < 1 else 1
+PIECEWISE = "Piecewise"
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.USub: operator.neg, ast.UAdd: operator.pos, ast.And: sp.And, ast.Or: sp.Or,
@@ -33,13 +35,16 @@ OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
 ARITHMETIC, COMPARISONS = tuple(OPERATORS)[:4], tuple(OPERATORS)[8:]
 
 NO_NUMBERS = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
-LARGEST = sp.Integer(10) ** 100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
+# numbers beyond it, or below 1/LARGEST: products of some would leave the floats
+LARGEST = sp.Integer(10) ** 100
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
 MAX_DEGREE = 24
 MAX_NESTED = 5
-MAX_NUMBER = sp.Integer(10) ** 16  # bases of numeric powers: nested powers must not exhaust the memory
-MAX_ARGUMENT = 500  # arguments of functions that are plain numbers: exp(exp(exp(9))) must not either
+# bases of numeric powers: nested powers must not exhaust the memory
+MAX_NUMBER = sp.Integer(10) ** 16
+# arguments of functions that are plain numbers: exp(exp(exp(9))) must not either
+MAX_ARGUMENT = 500
 
 
 class FormulaError(ValueError):
@@ -59,13 +64,20 @@ def symbol(name: str) -> sp.Symbol:
 
 
 def check_name(name: str) -> str:
-    """Return `name` if it can name a parameter or variable in a formula; raise ValueError if not."""
+    """Return `name` if it can name a parameter or variable in a formula; raise ValueError if
+    not."""
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        raise ValueError(f"{name!r} cannot name a symbol: use letters, digits and _, a letter first")
+        raise ValueError(
+            f"{name!r} cannot name a symbol: use letters, digits and _, a letter first"
+        )
     if keyword.iskeyword(name):
-        raise ValueError(f"{name!r} is a reserved word of Python; choose another name, such as {name}_")
+        raise ValueError(
+            f"{name!r} is a reserved word of Python; choose another name, such as {name}_"
+        )
     if name in FUNCTIONS or name in CONSTANTS or name == PIECEWISE:
-        raise ValueError(f"{name!r} already means a function or constant in formulas; choose another name")
+        raise ValueError(
+            f"{name!r} already means a function or constant in formulas; choose another name"
+        )
     return name
 
 
@@ -75,8 +87,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     Parameters
     ----------
     formula : str
-        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi``, the names in `symbols`, and choices:
-        ``2 if t < 45 else 0``, or ``Piecewise((2, t < 45), (0, True))``.
+        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi``, the names in
+        `symbols`, and choices: ``2 if t < 45 else 0``, or ``Piecewise((2, t < 45), (0, True))``.
     symbols : dict
         Name to SymPy symbol; any other name is an error.
 
@@ -100,14 +112,20 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     except TypeError:  # SymPy's, where numbers that are not real are compared
         raise FormulaError(formula, "the formula compares what has no real value") from None
     if _degree(expression) > MAX_DEGREE:
-        raise FormulaError(formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it")
+        raise FormulaError(
+            formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it"
+        )
     if expression.has(*NO_NUMBERS):
-        raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
+        raise FormulaError(
+            formula,
+            "the formula has no finite real value (division by zero or root of a negative?)",
+        )
     return expression
 
 
 def syntax(formula: str) -> tuple[str, ast.expr, int]:
-    """The formula on one line, its syntax tree, and the column at which that begins; nothing of it is run.
+    """The formula on one line, its syntax tree, and the column at which that begins; nothing of it
+    is run.
 
     Raises
     ------
@@ -115,11 +133,15 @@ def syntax(formula: str) -> tuple[str, ast.expr, int]:
         It is too long, has characters that formulas have not, or is no expression of Python.
     """
     if not isinstance(formula, str):
-        raise FormulaError(str(formula), f"a formula must be a string, got {type(formula).__name__}")
+        raise FormulaError(
+            str(formula), f"a formula must be a string, got {type(formula).__name__}"
+        )
     if not formula.strip():
         raise FormulaError(formula, "the formula is empty")
     if len(formula) > MAX_LENGTH:
-        raise FormulaError(formula, f"the formula has {len(formula)} characters; at most {MAX_LENGTH} are read")
+        raise FormulaError(
+            formula, f"the formula has {len(formula)} characters; at most {MAX_LENGTH} are read"
+        )
     formula = re.sub(r"[\t\n\r]", " ", formula)  # of a text over several lines
     _check_characters(formula)
     offset = len(formula) - len(formula.lstrip())
@@ -129,22 +151,34 @@ def syntax(formula: str) -> tuple[str, ast.expr, int]:
             tree = ast.parse(formula.strip(), mode="eval").body
     except SyntaxError as error:
         column = offset + max((error.offset or 1) - 1, 0)
-        hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]|\w\s+\w", formula) else ""
+        hint = (
+            "; a product needs *, as in 2*x"
+            if re.search(r"[0-9)]\s*[A-Za-z(]|\w\s+\w", formula)
+            else ""
+        )
         # Python's words of brackets are good; what else it says is for programmers
-        words = error.msg if re.search("closed|match|nested", error.msg) else "something is missing here, or too much"
+        words = (
+            error.msg
+            if re.search("closed|match|nested", error.msg)
+            else "something is missing here, or too much"
+        )
         raise FormulaError(formula, f"the formula cannot be read: {words}{hint}", column) from None
     except (ValueError, MemoryError, RecursionError):
-        raise FormulaError(formula, "the formula cannot be read: nested too deeply or has forbidden characters") from None
+        raise FormulaError(
+            formula, "the formula cannot be read: nested too deeply or has forbidden characters"
+        ) from None
     return formula, tree, offset
 
 
-# Typed for what formulas are made of: Cyrillic letters that look Latin, and signs of printed mathematics.
+# Typed for what formulas are made of: Cyrillic letters that look Latin, and signs of printed
+# mathematics.
 _LOOKS_LIKE = dict(zip("асеорхуАВСЕНКМОРТХ−–·×⋅∙÷", "aceopxyABCEHKMOPTX--****/", strict=True))
 _INSTEAD = {"^": "** for a power (x**2)", "#": "comments elsewhere"}
 
 
 def _check_characters(formula: str) -> None:
-    """FormulaError at the first character that formulas have not: Python would take ſ for s, and end at #."""
+    """FormulaError at the first character that formulas have not: Python would take ſ for s, and
+    end at #."""
     for column, character in enumerate(formula):
         if character.isascii() and character.isprintable() and character not in "^#":
             continue
@@ -155,7 +189,11 @@ def _check_characters(formula: str) -> None:
         )
         name = unicodedata.name(character, f"U+{ord(character):04X}").lower()
         shown = character if character.isprintable() else "a character"
-        raise FormulaError(formula, f"{shown} ({name}) has no meaning in a formula{'; write ' * bool(instead)}{instead}", column)
+        raise FormulaError(
+            formula,
+            f"{shown} ({name}) has no meaning in a formula{'; write ' * bool(instead)}{instead}",
+            column,
+        )
 
 
 class Reader:
@@ -185,8 +223,15 @@ class Reader:
             case ast.Call():
                 return self.call(node)
             case ast.IfExp():
-                return sp.Piecewise((self.read(node.body), self.condition(node.test)), (self.read(node.orelse), True))
-        raise self.fail(node, f"{type(node).__name__} is not allowed in a formula; only + - * / ** numbers, names, functions")
+                return sp.Piecewise(
+                    (self.read(node.body), self.condition(node.test)),
+                    (self.read(node.orelse), True),
+                )
+        raise self.fail(
+            node,
+            f"{type(node).__name__} is not allowed in a formula; only + - * / ** numbers, names, "
+            f"functions",
+        )
 
     def number(self, node: ast.Constant) -> sp.Expr:
         if type(node.value) not in (int, float):
@@ -195,7 +240,10 @@ class Reader:
         # as written, since 1e-400 is 0 as a float
         value = sp.Rational(node.value if isinstance(node.value, int) else written.replace("_", ""))
         if value and not 1 / LARGEST < abs(value) < LARGEST:
-            raise self.fail(node, "the number is too large or too small (1e-100 to 1e100 are read): change the units")
+            raise self.fail(
+                node,
+                "the number is too large or too small (1e-100 to 1e100 are read): change the units",
+            )
         return value
 
     def name(self, node: ast.Name) -> sp.Expr:
@@ -205,30 +253,47 @@ class Reader:
         if node.id in FUNCTIONS:
             raise self.fail(node, f"{node.id} is a function; write {node.id}(...)")
         names = ", ".join(sorted(known))
-        raise self.fail(node, f"unknown symbol {node.id!r}; known here: {names}. A parameter needs a value in `parameters`")
+        raise self.fail(
+            node,
+            f"unknown symbol {node.id!r}; known here: {names}. A parameter needs a value in "
+            f"`parameters`",
+        )
 
     def power(self, node: ast.BinOp) -> sp.Expr:
         base, exponent = self.read(node.left), self.read(node.right)
         if exponent.free_symbols or not exponent.is_Rational:
-            raise self.fail(node.right, "an exponent must be a plain number; write exp(...) for exponentials")
+            raise self.fail(
+                node.right, "an exponent must be a plain number; write exp(...) for exponentials"
+            )
         if abs(exponent) > MAX_EXPONENT:
             raise self.fail(node.right, f"the exponent is larger than {MAX_EXPONENT}")
         if base.is_number and base.is_negative and not exponent.is_Integer:
             raise self.fail(node, "a root of a negative number has no real value")
-        if base.is_number and (abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)):
+        if base.is_number and (
+            abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)
+        ):
             raise self.fail(node, "the power of this number is too large or too small")
         result = base**exponent
         if _degree(result) > MAX_DEGREE:
-            raise self.fail(node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula")
+            raise self.fail(
+                node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula"
+            )
         return result
 
     def piecewise(self, node: ast.Call) -> sp.Expr:
         pairs = [arg.elts for arg in node.args if isinstance(arg, ast.Tuple) and len(arg.elts) == 2]
         if node.keywords or not pairs or len(pairs) < len(node.args):
-            raise self.fail(node, "Piecewise takes pairs (formula, condition), as in Piecewise((x, x < 1), (1, True))")
+            raise self.fail(
+                node,
+                "Piecewise takes pairs (formula, condition), as in Piecewise((x, x < 1), (1, "
+                "True))",
+            )
         read = [(self.read(formula), self.condition(condition)) for formula, condition in pairs]
         if read[-1][1] is not sp.true:
-            raise self.fail(node, "the last pair of Piecewise holds for the rest and must have the condition True")
+            raise self.fail(
+                node,
+                "the last pair of Piecewise holds for the rest and must have the condition True",
+            )
         return sp.Piecewise(*read)
 
     def condition(self, node: ast.expr) -> Boolean:
@@ -237,7 +302,9 @@ class Reader:
                 return sp.true if node.value else sp.false
             case ast.Compare() if all(isinstance(op, COMPARISONS) for op in node.ops):
                 sides = pairwise([self.read(side) for side in (node.left, *node.comparators)])
-                parts = [OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, sides, strict=True)]
+                parts = [
+                    OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, sides, strict=True)
+                ]
                 if any(map(undecided, parts)):
                     raise self.fail(node, f"{UNDECIDED}; write the one that holds")
                 return sp.And(*parts)
@@ -245,17 +312,25 @@ class Reader:
                 return OPERATORS[type(node.op)](*map(self.condition, node.values))
             case ast.UnaryOp(op=ast.Not()):
                 return sp.Not(self.condition(node.operand))
-        raise self.fail(node, "a condition compares: x < 1, 30 <= t < 45, k == 20, joined by `and`, `or`, `not`")
+        raise self.fail(
+            node, "a condition compares: x < 1, 30 <= t < 45, k == 20, joined by `and`, `or`, `not`"
+        )
 
     def call(self, node: ast.Call) -> sp.Expr:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
             hint = "" if isinstance(node.func, ast.Name) else "; a product needs *"
             raise self.fail(
-                node, f"{ast.unparse(node.func)[:40]!r} is not a known function{hint}; known: {', '.join(sorted(FUNCTIONS))}"
+                node,
+                f"{ast.unparse(node.func)[:40]!r} is not a known function{hint}; known: "
+                f"{', '.join(sorted(FUNCTIONS))}",
             )
         count = ARGUMENTS.get(node.func.id, 1)
         if node.keywords or len(node.args) != count:
-            raise self.fail(node, f"{node.func.id} takes exactly {'one argument' if count == 1 else f'{count} arguments'}")
+            raise self.fail(
+                node,
+                f"{node.func.id} takes exactly "
+                f"{'one argument' if count == 1 else f'{count} arguments'}",
+            )
         if self.nested >= MAX_NESTED:
             raise self.fail(node, f"functions are nested more than {MAX_NESTED} deep")
         self.nested += 1
@@ -272,7 +347,8 @@ UNDECIDED = "the choice depends on numbers that do not differ in 15 digits"
 
 
 def undecided(condition: Boolean) -> bool:
-    """Whether a condition has no symbols, and yet SymPy does not find its value; a Piecewise with it would never be ready."""
+    """Whether a condition has no symbols, and yet SymPy does not find its value; a Piecewise with
+    it would never be ready."""
     return not condition.free_symbols and condition not in (sp.true, sp.false)
 
 

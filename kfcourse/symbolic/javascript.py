@@ -8,10 +8,12 @@ prints a function that runs over an ensemble kept in arrays of numbers,
 
 ::
 
-    predict(n, v, c, a):    for each i < n:  a.tau[i], a.Theta[i] from a.z[i], a.p[i] and the constants v and c.
+    predict(n, v, c, a):   for each i < n:
+        a.tau[i], a.Theta[i] from a.z[i], a.p[i] and the constants v and c.
 
-Only what stands in `FUNCTIONS` is printed.  Anything else is refused in words when the book is built: SymPy's printer writes what
-JavaScript does not have (`Sum`, `I`, `erf`) as if JavaScript had it, and the reader's browser would find that out.
+Only what stands in `FUNCTIONS` is printed.  Anything else is refused in words when the book is
+built: SymPy's printer writes what JavaScript does not have (`Sum`, `I`, `erf`) as if JavaScript had
+it, and the reader's browser would find that out.
 """
 
 from __future__ import annotations
@@ -35,14 +37,41 @@ class inverse(sp.Function):
 
 
 FUNCTIONS = (
-    *(sp.exp, sp.log, expm1, log1p, sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2, sp.sinh, sp.cosh, sp.tanh),
+    *(
+        sp.exp,
+        sp.log,
+        expm1,
+        log1p,
+        sp.sin,
+        sp.cos,
+        sp.tan,
+        sp.asin,
+        sp.acos,
+        sp.atan,
+        sp.atan2,
+        sp.sinh,
+        sp.cosh,
+        sp.tanh,
+    ),
     *(sp.Abs, sp.sign, sp.Min, sp.Max, inverse),
 )
-_OTHERS = (sp.Symbol, sp.Number, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.Pow, sp.Piecewise, ExprCondPair)
+_OTHERS = (
+    sp.Symbol,
+    sp.Number,
+    type(sp.pi),
+    type(sp.E),
+    sp.Add,
+    sp.Mul,
+    sp.Pow,
+    sp.Piecewise,
+    ExprCondPair,
+)
 _KNOWN = (*FUNCTIONS, *_OTHERS, Relational, sp.And, sp.Or, type(sp.true))
 # What the printed functions call beside JavaScript's own.
 RUNTIME = "const kfInverse = (x) => (x === 0 ? 0 : 1 / x);\n"
-_printer = JavascriptCodePrinter({"user_functions": {"inverse": "kfInverse", "expm1": "Math.expm1", "log1p": "Math.log1p"}})
+_printer = JavascriptCodePrinter(
+    {"user_functions": {"inverse": "kfInverse", "expm1": "Math.expm1", "log1p": "Math.log1p"}}
+)
 
 
 def expression(e: sp.Basic, names: Mapping[sp.Symbol, str]) -> str:
@@ -55,15 +84,25 @@ def expression(e: sp.Basic, names: Mapping[sp.Symbol, str]) -> str:
     """
     check_numbers("a page's formula", sp.Matrix([e]))
     for node in sp.preorder_traversal(e):
-        if not isinstance(node, _KNOWN) or (isinstance(node, sp.Piecewise) and node.args[-1].cond != sp.true):
+        if not isinstance(node, _KNOWN) or (
+            isinstance(node, sp.Piecewise) and node.args[-1].cond != sp.true
+        ):
             listed = ", ".join(sorted(function.__name__ for function in FUNCTIONS))
             raise ModelError(
-                f"{type(node).__name__}, in {sp.sstr(node)}, is nothing that the pages' JavaScript knows; "
+                f"{type(node).__name__}, in {sp.sstr(node)}, is nothing that the pages' "
+                f"JavaScript knows; "
                 f"it has {listed}, and powers"
             )
     if unknown := e.free_symbols - names.keys():
-        raise ModelError(f"the symbol {min(map(str, unknown))} is nothing that the pages' JavaScript knows: nothing defines it")
-    return str(_printer.doprint(e.xreplace({symbol: sp.Symbol(text, real=True) for symbol, text in names.items()})))
+        raise ModelError(
+            f"the symbol {min(map(str, unknown))} is nothing that the pages' JavaScript knows: "
+            f"nothing defines it"
+        )
+    return str(
+        _printer.doprint(
+            e.xreplace({symbol: sp.Symbol(text, real=True) for symbol, text in names.items()})
+        )
+    )
 
 
 def loop(
@@ -81,7 +120,8 @@ def loop(
     name : str
         What the function is called.
     arguments : dict
-        Name of an array to the matrix of symbols that it holds, entry by entry, trajectory after trajectory.
+        Name of an array to the matrix of symbols that it holds, entry by entry, trajectory after
+        trajectory.
     outputs : dict
         Name of an array to the matrix of expressions that is written into it.
     definitions : dict, optional
@@ -104,17 +144,32 @@ def loop(
     inner: dict[sp.Symbol, sp.Expr] = {}
     for symbol, value in (definitions or {}).items():
         inner[symbol] = value.xreplace(inner)
-    assignments, reduced = sp.cse([entry.xreplace(inner) for matrix in outputs.values() for entry in matrix])
+    assignments, reduced = sp.cse(
+        [entry.xreplace(inner) for matrix in outputs.values() for entry in matrix]
+    )
     lines = []
     for number, (symbol, value) in enumerate(assignments):
         lines.append(f"const s{number} = {expression(value, names)};")
         names[symbol] = f"s{number}"
-    places = [f"a.{output}[{_index(len(matrix), i)}]" for output, matrix in outputs.items() for i in range(len(matrix))]
+    places = [
+        f"a.{output}[{_index(len(matrix), i)}]"
+        for output, matrix in outputs.items()
+        for i in range(len(matrix))
+    ]
     # All is read before anything is written: an output may stand in the place of an argument.
-    lines += [f"const o{number} = {expression(value, names)};" for number, value in enumerate(reduced)]
+    lines += [
+        f"const o{number} = {expression(value, names)};" for number, value in enumerate(reduced)
+    ]
     lines += [f"{place} = o{number};" for number, place in enumerate(places)]
     return "\n".join(
-        [f"function {name}(n, v, c, a) {{", "  for (let i = 0; i < n; i++) {", *(f"    {x}" for x in lines), "  }", "}", ""]
+        [
+            f"function {name}(n, v, c, a) {{",
+            "  for (let i = 0; i < n; i++) {",
+            *(f"    {x}" for x in lines),
+            "  }",
+            "}",
+            "",
+        ]
     )
 
 

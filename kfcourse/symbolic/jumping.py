@@ -1,10 +1,12 @@
-r"""A model that jumps: several ways to move and to measure, its modes, of which one is in force at each step.
+r"""A model that jumps: several ways to move and to measure, its modes, of which one is in force at
+each step.
 
     x_{k+1} = a^{i_{k+1}}(x_k, v_k)        y_k = b^{i_k}(x_k, w_k)
     P(i_{k+1} = j | i_k = i, x_k = x) = pi_ij(k) or pi_ij(x, k),    P(i_0 = j) = q_j
 
-Nobody sees the mode i_k.  (Systems with random structure, системы со случайной структурой; jump Markov systems.)  A mode is an
-ordinary `Model`, so that its structural functions, densities and code are derived as any model's are.
+Nobody sees the mode i_k.  (Systems with random structure, системы со случайной структурой; jump
+Markov systems.)  A mode is an ordinary `Model`, so that its structural functions, densities and
+code are derived as any model's are.
 """
 
 from __future__ import annotations
@@ -22,9 +24,19 @@ from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import OF_A_VARIANT, Model
-from kfcourse.symbolic.reading import Formula, Formulas, ModelError, by_name, exact_number, read, shown, table
+from kfcourse.symbolic.reading import (
+    Formula,
+    Formulas,
+    ModelError,
+    by_name,
+    exact_number,
+    read,
+    shown,
+    table,
+)
 
-OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
+# in which modes may differ
+OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")
 SUM = 1e-9  # a row of probabilities written with ten digits sums to 1 within this
 
 
@@ -66,10 +78,11 @@ class JumpModel:
         state, meter, parameters, options
             As of `Model.define`: what holds in every mode.
         modes : dict
-            Name of a mode to what differs there: `state`, `meter`, `parameters`, `state_noise`, `meter_noise`.
+            Name of a mode to what differs there: `state`, `meter`, `parameters`, `state_noise`,
+            `meter_noise`.
         transition : matrix, or list
-            pi, the rows of which sum to 1: numbers, or formulas of the state x_k, the step's number k, its time t, inputs and
-            parameters.
+            pi, the rows of which sum to 1: numbers, or formulas of the state x_k, the step's number
+            k, its time t, inputs and parameters.
             A single row: at each step the mode is drawn anew with these probabilities.
         first : list, optional
             q, law of the mode of the first measurement.  By default a single row's own.
@@ -84,13 +97,16 @@ class JumpModel:
         >>> from kfcourse import JumpModel
         >>> JumpModel.define("0.9*x + v", "x + C*w", modes={"sound": {"parameters": {"C": 1}},
         ...                  "faulty": {"parameters": {"C": 10}}}, transition=[0.8, 0.2])
-        JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x; C = 10)
+        JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x;
+        C = 10)
         """
         tables = _tables(modes)
         common = table("parameters", parameters)
         built = []
         for name, change in tables.items():
-            own = {key: change[key] for key in change if key not in ("state", "meter", "parameters")}
+            own = {
+                key: change[key] for key in change if key not in ("state", "meter", "parameters")
+            }
             try:
                 values = {**common, **table("parameters", change.get("parameters"))}
                 parts = change.get("state", state), change.get("meter", meter)
@@ -99,13 +115,19 @@ class JumpModel:
                 raise ModelError(f"mode {name}: {error}") from None
         fitting = _fitting(tuple(tables), built)
         chain, rows = _chain(transition, len(built))
-        changed = {name for change in tables.values() for name in table("parameters", change.get("parameters"))}
+        changed = {
+            name
+            for change in tables.values()
+            for name in table("parameters", change.get("parameters"))
+        }
         matrix, of_step = _compiled(chain, fitting[0], common, changed)
         if rows == 1 and first is None and not matrix.has(*fitting[0].x):
             first = np.asarray(of_step.at(0)()[0], dtype=float)[0].tolist()
         model = cls(tuple(tables), fitting, _law(first, len(built)), matrix, of_step)
         if not model.by_state:
-            model.transition_at(0)  # a row that is none is refused here; of later steps and of states, where they are reached
+            # a row that is none is refused here; of later steps and of states, where they are
+            # reached
+            model.transition_at(0)
         return model
 
     @property
@@ -149,11 +171,14 @@ class JumpModel:
         return self.chain.has(*self.x)
 
     def without_state(self, what: str) -> None:
-        """ModelError, which names what needs them, if the modes' probabilities before any measurement are not known."""
+        """ModelError, which names what needs them, if the modes' probabilities before any
+        measurement are not known."""
         if self.by_state:
             raise ModelError(
-                f"{what}: with transitions that depend on the state nobody knows the probabilities of the modes before anything "
-                "is measured; take filters that carry them: aof-jump-gaussian, aof-jump-linearised, imm, gpb2"
+                f"{what}: with transitions that depend on the state nobody knows the "
+                f"probabilities of the modes before anything "
+                "is measured; take filters that carry them: aof-jump-gaussian, "
+                "aof-jump-linearised, imm, gpb2"
             )
 
     def transition_of(self, x: Array, k: int) -> Array:
@@ -164,23 +189,36 @@ class JumpModel:
         with np.errstate(all="ignore"):
             rows = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
             total = rows.sum(axis=-1, keepdims=True)
-            wrong = ~((rows >= 0) & (np.abs(total - 1) <= SUM)).all(axis=(-2, -1)) & np.isfinite(x).all(axis=-1)
+            wrong = ~((rows >= 0) & (np.abs(total - 1) <= SUM)).all(axis=(-2, -1)) & np.isfinite(
+                x
+            ).all(axis=-1)
         if wrong.any():
-            problem, place = _not_probabilities(rows[wrong][0]), ", ".join(f"{value:g}" for value in x[wrong][0])
-            raise ModelError(f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {place}: {problem}")
+            problem, place = (
+                _not_probabilities(rows[wrong][0]),
+                ", ".join(f"{value:g}" for value in x[wrong][0]),
+            )
+            raise ModelError(
+                f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {place}: "
+                f"{problem}"
+            )
         return rows / total
 
     def transition_at(self, k: int) -> Array:
-        """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends on the state."""
+        """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends
+        on the state."""
         self.without_state("a matrix of transitions for all states")
         with np.errstate(all="ignore"):
             rows = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
         if problem := _not_probabilities(rows):
-            raise ModelError(f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} steps")
+            raise ModelError(
+                f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} "
+                f"steps"
+            )
         return rows / rows.sum(axis=1, keepdims=True)
 
     def law_at(self, k: int) -> Array:
-        """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError if they are not known."""
+        """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError
+        if they are not known."""
         self.without_state("the law of the modes")
         if not self.chain_of_step.known.symbols:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
@@ -190,22 +228,29 @@ class JumpModel:
         """The same model with parameters changed in all modes."""
         modes = tuple(mode.replace(**parameters) for mode in self.modes)
         if self.chain.has(*(symbol(name) for name in parameters)):
-            raise ModelError(f"`transition` contains {', '.join(parameters)}: define the model anew")
+            raise ModelError(
+                f"`transition` contains {', '.join(parameters)}: define the model anew"
+            )
         return JumpModel(self.names, modes, self.first, self.chain, self.chain_of_step)
 
     def latex(self) -> str:
-        """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned` block."""
+        """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned`
+        block."""
         lines = []
         for name, mode in zip(self.names, self.modes, strict=True):
             block = mode.latex().removeprefix("\\begin{aligned}\n").removesuffix("\n\\end{aligned}")
-            lines += [rf"\text{{mode {name.replace('_', chr(92) + '_')}:}}\quad &", *block.split(" \\\\\n")]
+            lines += [
+                rf"\text{{mode {name.replace('_', chr(92) + '_')}:}}\quad &",
+                *block.split(" \\\\\n"),
+            ]
         first = sp.Matrix([[sp.Float(share, 4) for share in self.first]])
         lines += [rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:
         texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
-        return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in zip(self.names, texts, strict=True))})"
+        pairs = zip(self.names, texts, strict=True)
+        return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in pairs)})"
 
 
 def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
@@ -215,23 +260,36 @@ def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
             raise ModelError(f"`{spare[0]}` is of a model with `modes`, and there are none")
         return Model.of_table(given)
     if "transition" not in given:
-        raise ModelError("a model with `modes` needs `transition`, a matrix of probabilities whose rows sum to 1")
+        raise ModelError(
+            "a model with `modes` needs `transition`, a matrix of probabilities whose rows sum to 1"
+        )
     missing = [key for key in ("state", "meter") if key not in given]
     if missing:
-        raise ModelError(f"there is no {' and no '.join(missing)}: give what holds in all modes that have none of their own")
-    options = {key: value for key, value in given.items() if key not in ("state", "meter", "parameters", *OF_A_VARIANT)}
+        raise ModelError(
+            f"there is no {' and no '.join(missing)}: give what holds in all modes that have none "
+            f"of their own"
+        )
+    options = {
+        key: value
+        for key, value in given.items()
+        if key not in ("state", "meter", "parameters", *OF_A_VARIANT)
+    }
     return JumpModel.define(given["state"], given["meter"], given.get("parameters"), **options)
 
 
 def _tables(modes: Any) -> dict[str, dict[str, Any]]:
     if not isinstance(modes, Mapping) or not modes:
         raise ModelError(
-            f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}"
+            f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = "
+            f"{{...}}}}, got {shown(modes)}"
         )
     tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}
     for name, change in tables.items():
         if unknown := sorted(set(change) - set(OF_A_MODE)):
-            raise ModelError(f"mode {name}: modes may differ in {', '.join(OF_A_MODE)}, not in {', '.join(unknown)}")
+            raise ModelError(
+                f"mode {name}: modes may differ in {', '.join(OF_A_MODE)}, not in "
+                f"{', '.join(unknown)}"
+            )
     return tables
 
 
@@ -246,10 +304,19 @@ def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...
             ("noise(s) of the meter", len(first.w), len(mode.w)),
         ):
             if here != there:
-                remedy = '; name them all by `symbols`, such as v = ["v1", "v2"]' if what.startswith("noise") else ""
-                raise ModelError(f"all modes need as many {what}: mode {names[0]} has {here}, mode {name} has {there}{remedy}")
+                remedy = (
+                    '; name them all by `symbols`, such as v = ["v1", "v2"]'
+                    if what.startswith("noise")
+                    else ""
+                )
+                raise ModelError(
+                    f"all modes need as many {what}: mode {names[0]} has {here}, mode {name} has "
+                    f"{there}{remedy}"
+                )
         if mode.x != first.x or mode.angles != first.angles:
-            raise ModelError(f"modes {names[0]} and {name} differ in their state's symbols or angles")
+            raise ModelError(
+                f"modes {names[0]} and {name} differ in their state's symbols or angles"
+            )
     return tuple(modes)
 
 
@@ -265,7 +332,8 @@ def _chain(given: Any, size: int) -> tuple[list[list[Formula]], int]:
         rows = [rows] * size
     if not rows or len(rows) != size or not all(is_row(row) and len(row) == size for row in rows):
         raise ModelError(
-            f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or one row, got {shown(given)}"
+            f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or one "
+            f"row, got {shown(given)}"
         )
     return [list(row) for row in rows], count
 
@@ -273,33 +341,49 @@ def _chain(given: Any, size: int) -> tuple[list[list[Formula]], int]:
 def _compiled(
     rows: list[list[Formula]], model: Model, common: Mapping[str, float], changed: set[str]
 ) -> tuple[sp.ImmutableMatrix, Stepwise]:
-    names = {name: symbol(name) for name in common if name not in changed}  # what differs between the modes is not known
-    of_step = model.known.names([*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))])
+    # what differs between the modes is not known
+    names = {name: symbol(name) for name in common if name not in changed}
+    of_step = model.known.names(
+        [*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))]
+    )
     known = names | of_step | by_name(model.x)
     try:
         matrix = sp.ImmutableMatrix(
             [
-                [read(p, known, "transition") if isinstance(p, str | sp.Expr) else exact_number("an entry", p) for p in row]
+                [
+                    read(p, known, "transition")
+                    if isinstance(p, str | sp.Expr)
+                    else exact_number("an entry", p)
+                    for p in row
+                ]
                 for row in rows
             ]
         )
     except (ModelError, FormulaError) as error:
         raise ModelError(f"`transition`: {error}") from None
     arguments = {"x": sp.Matrix(model.x)} if matrix.has(*model.x) else {}
-    numeric = matrix.subs({symbol(name): exact_number(f"parameter {name}", value) for name, value in common.items()})
+    numeric = matrix.subs(
+        {symbol(name): exact_number(f"parameter {name}", value) for name, value in common.items()}
+    )
     used = model.known.used(matrix, of_step)
-    return matrix, Stepwise.compile(used, "transition", arguments, {"transition": numeric}, [*arguments])
+    return matrix, Stepwise.compile(
+        used, "transition", arguments, {"transition": numeric}, [*arguments]
+    )
 
 
 def _law(first: Any, size: int) -> Array:
     if first is None:
-        raise ModelError("`first` is missing: the probabilities of the modes at the first measurement")
+        raise ModelError(
+            "`first` is missing: the probabilities of the modes at the first measurement"
+        )
     try:
         law = np.asarray(first, dtype=float)
     except (TypeError, ValueError):
         law = np.array(np.nan)
     if law.shape != (size,):
-        raise ModelError(f"`first` must be {size} probabilities for {size} mode(s), got {shown(first)}")
+        raise ModelError(
+            f"`first` must be {size} probabilities for {size} mode(s), got {shown(first)}"
+        )
     if problem := _not_probabilities(law[None]):
         raise ModelError(f"`first`: {problem}")
     return law / law.sum()

@@ -1,6 +1,8 @@
-"""What is known of every step: its number k, its time t = interval * k, and the inputs; and functions that depend on it.
+"""What is known of every step: its number k, its time t = interval * k, and the inputs; and
+functions that depend on it.
 
-A model without them pays nothing: a `Stepwise` function is then the generated function itself, at every step.
+A model without them pays nothing: a `Stepwise` function is then the generated function itself, at
+every step.
 """
 
 from __future__ import annotations
@@ -15,7 +17,15 @@ import sympy as sp
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import symbol
-from kfcourse.symbolic.reading import ModelError, checked_name, exact_number, of_numbers, read, shown, table
+from kfcourse.symbolic.reading import (
+    ModelError,
+    checked_name,
+    exact_number,
+    of_numbers,
+    read,
+    shown,
+    table,
+)
 
 
 @dataclass(frozen=True)
@@ -41,13 +51,22 @@ class Known:
         """The interval and the inputs as people give them; ModelError if they are none."""
         length = exact_number("interval", interval)
         if not length > 0:
-            raise ModelError(f"the interval between two steps must be positive, got {shown(interval)}")
-        values = {checked_name(name): _sequence(name, given) for name, given in table("inputs", inputs).items()}
+            raise ModelError(
+                f"the interval between two steps must be positive, got {shown(interval)}"
+            )
+        values = {
+            checked_name(name): _sequence(name, given)
+            for name, given in table("inputs", inputs).items()
+        }
         return cls((), length, values)
 
     def names(self, taken: Sequence[str]) -> dict[str, sp.Symbol]:
         """Symbols that formulas may use: k and t, where they name nothing else, and the inputs."""
-        return {name: symbol(name) for name in ("k", "t", *self.inputs) if name in self.inputs or name not in taken}
+        return {
+            name: symbol(name)
+            for name in ("k", "t", *self.inputs)
+            if name in self.inputs or name not in taken
+        }
 
     def used(self, equations: sp.MatrixBase, known: Mapping[str, sp.Symbol]) -> Known:
         """The same with the symbols of these equations."""
@@ -56,7 +75,16 @@ class Known:
     @property
     def steps(self) -> float:
         """For how many steps the inputs have values; infinite if nothing ends."""
-        return min([np.inf, *(len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols)])
+        return min(
+            [
+                np.inf,
+                *(
+                    len(values)
+                    for name, values in self.inputs.items()
+                    if symbol(name) in self.symbols
+                ),
+            ]
+        )
 
     def at(self, k: int) -> Array:
         """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
@@ -67,7 +95,8 @@ class Known:
             values = self.inputs[name]
             if k >= len(values):
                 raise ModelError(
-                    f"the input {name} has {len(values)} value(s), for the steps 0 to {len(values) - 1}, but step {k} needs one; "
+                    f"the input {name} has {len(values)} value(s), for the steps 0 to "
+                    f"{len(values) - 1}, but step {k} needs one; "
                     "give a value for every step, or run fewer"
                 )
             return values[k]
@@ -75,10 +104,18 @@ class Known:
 
     def latex(self) -> list[str]:
         """Lines of an `aligned` block: the time, and the first values of the inputs."""
-        lines = [rf"t &= {sp.latex(self.interval * symbol('k'))}"] if symbol("t") in self.symbols else []
+        lines = (
+            [rf"t &= {sp.latex(self.interval * symbol('k'))}"]
+            if symbol("t") in self.symbols
+            else []
+        )
         for name, values in self.inputs.items():
-            shown = ", ".join(f"{value:g}" for value in values[:6]) + (r", \ldots" if len(values) > 6 else "")
-            lines.append(rf"{sp.latex(symbol(name))}_0, {sp.latex(symbol(name))}_1, \ldots &= {shown}")
+            shown = ", ".join(f"{value:g}" for value in values[:6]) + (
+                r", \ldots" if len(values) > 6 else ""
+            )
+            lines.append(
+                rf"{sp.latex(symbol(name))}_0, {sp.latex(symbol(name))}_1, \ldots &= {shown}"
+            )
         return lines
 
 
@@ -88,12 +125,16 @@ def _sequence(name: str, given: Any) -> tuple[float, ...]:
     except (TypeError, ValueError, OverflowError):
         values = np.array(np.nan)
     if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
-        raise ModelError(f"the input {name} must be a list of finite numbers, one for every step; got {shown(given)}")
+        raise ModelError(
+            f"the input {name} must be a list of finite numbers, one for every step; got "
+            f"{shown(given)}"
+        )
     return tuple(values.tolist())
 
 
 class Stepwise(NamedTuple):
-    """A generated function, and what is known of every step: the function's last argument, if its formulas contain any of it."""
+    """A generated function, and what is known of every step: the function's last argument, if its
+    formulas contain any of it."""
 
     compiled: Compiled
     known: Known
@@ -124,41 +165,66 @@ class Stepwise(NamedTuple):
 def needed(k: int | None) -> int:
     """The step; ModelError if it is not given."""
     if k is None:
-        raise ModelError("the model depends on the step: say which, as in structure.at(k) or equation(x, v, k)")
+        raise ModelError(
+            "the model depends on the step: say which, as in structure.at(k) or equation(x, v, k)"
+        )
     return k
 
 
 def varying_law(
-    what: str, given: Mapping[str, Any] | None, noises: Sequence[sp.Symbol], symbols: dict[str, sp.Symbol]
+    what: str,
+    given: Mapping[str, Any] | None,
+    noises: Sequence[sp.Symbol],
+    symbols: dict[str, sp.Symbol],
 ) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any]]:
     """A law of noises in which variances may be formulas of the step.
 
-    A noise with the mean m and the variance D_k is m + sqrt(D_k) v with a standard v: this goes into the equations.
+    A noise with the mean m and the variance D_k is m + sqrt(D_k) v with a standard v: this goes
+    into the equations.
 
     Returns
     -------
     dict, dict
-        What takes the place of each such noise in the equations, and the law that is left for the noises.
+        What takes the place of each such noise in the equations, and the law that is left for the
+        noises.
     """
     law, size = table(what, given), len(noises)
     variance = law.get("variance")
-    entries = [variance] * size if _is_formula(variance) else [*variance] if isinstance(variance, Sequence) else []
-    if any(any(map(_is_formula, row)) for row in entries if isinstance(row, Sequence) and not isinstance(row, str)):
+    entries = (
+        [variance] * size
+        if _is_formula(variance)
+        else [*variance]
+        if isinstance(variance, Sequence)
+        else []
+    )
+    if any(
+        any(map(_is_formula, row))
+        for row in entries
+        if isinstance(row, Sequence) and not isinstance(row, str)
+    ):
         raise ModelError(
-            f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that change with time into the "
+            f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that "
+            f"change with time into the "
             "equation, as in (1 + k)*v1 + k*v2"
         )
-    formulas = {i: read(entry, symbols, what) for i, entry in enumerate(entries) if _is_formula(entry)}
+    formulas = {
+        i: read(entry, symbols, what) for i, entry in enumerate(entries) if _is_formula(entry)
+    }
     if not formulas:
         return {}, law
     mean = law.get("mean", 0.0)
     means = [mean] * size if np.ndim(mean) == 0 else [*mean]
     if len(entries) != size or len(means) != size:
-        raise ModelError(f"`{what}`: {len(entries)} variances and {len(means)} means for {size} noise(s); give one for each")
+        raise ModelError(
+            f"`{what}`: {len(entries)} variances and {len(means)} means for {size} noise(s); give "
+            f"one for each"
+        )
     law["mean"] = [0.0 if i in formulas else entry for i, entry in enumerate(means)]
     law["variance"] = [1.0 if i in formulas else entry for i, entry in enumerate(entries)]
     shift = {i: exact_number(f"`{what}`: mean", means[i]) for i in formulas}
-    return {noises[i]: shift[i] + sp.sqrt(formula) * noises[i] for i, formula in formulas.items()}, law
+    return {
+        noises[i]: shift[i] + sp.sqrt(formula) * noises[i] for i, formula in formulas.items()
+    }, law
 
 
 def _is_formula(entry: Any) -> bool:

@@ -63,11 +63,13 @@ class Model:
     prior, state_noise, meter_noise : Gaussian
         Laws of x_0, v_k, w_k: mean (n,) and covariance (n, n).
     known : Known
-        What is known of every step: its number k, its time t, and the inputs that the equations contain.
+        What is known of every step: its number k, its time t, and the inputs that the equations
+        contain.
     angles : Angles
         Numbers of the components of x and of y that are angles, kept between -pi and pi.
     between : kfcourse.continuous.sampling.Between, optional
-        How the state moves in continuous time from one measurement to the next.  The state equation then is dx/dt.
+        How the state moves in continuous time from one measurement to the next.  The state equation
+        then is dx/dt.
     """
 
     state_equation: sp.ImmutableMatrix
@@ -103,23 +105,28 @@ class Model:
         Parameters
         ----------
         state, meter : str, sympy expression, or a list of them
-            a(x, v) and b(x, w), which may contain the step's number k, its time t, and inputs.  A single formula is a
-            scalar model in x, v, w; lists of formulas use x1, x2, ..., v1, ..., w1, ... unless `symbols` names them.
+            a(x, v) and b(x, w), which may contain the step's number k, its time t, and inputs.  A
+            single formula is a scalar model in x, v, w; lists of formulas use x1, x2, ..., v1, ...,
+            w1, ... unless `symbols` names them.
         parameters : dict
             Name to number, for every other symbol in the formulas.
         symbols : dict, optional
             Keys "x", "v", "w": lists of names.
         prior, state_noise, meter_noise : dict, optional
             Keys "mean" and "variance" (number, list of variances, or covariance matrix).  Standard
-            normal by default.  Variances of noises may be formulas of k, t, the inputs and the parameters, such as
-            "0.1 + 0.02*k": the noises are then standard, and the roots of the formulas go into the equations.
+            normal by default.  Variances of noises may be formulas of k, t, the inputs and the
+            parameters, such as "0.1 + 0.02*k": the noises are then standard, and the roots of the
+            formulas go into the equations.
         angles : list of names, or dict, optional
-            Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}: they are kept between -pi and
-            pi, and every filter takes their innovations, means and errors the short way round.  [] says that there are none.
+            Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}:
+            they are kept between -pi and pi, and every filter takes their innovations, means and
+            errors the short way round.  [] says that there are none.
         inputs : dict, optional
-            Name to a list of values, those at the steps 0, 1, 2...: one sequence for all trajectories.
+            Name to a list of values, those at the steps 0, 1, 2...: one sequence for all
+            trajectories.
         interval : float
-            Time between two steps, in the unit of t: t = interval * k.  Where k and t name something else, they mean that.
+            Time between two steps, in the unit of t: t = interval * k.  Where k and t name
+            something else, they mean that.
 
         Raises
         ------
@@ -131,8 +138,9 @@ class Model:
         Warns
         -----
         AngleWarning
-            A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given; a meter contains an angle outside
-            sin and cos, and no key y of `angles` says whether it is one; the prior mean of an angle is beyond 2 pi.
+            A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given; a
+            meter contains an angle outside sin and cos, and no key y of `angles` says whether it is
+            one; the prior mean of an angle is beyond 2 pi.
 
         Examples
         --------
@@ -141,19 +149,33 @@ class Model:
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
         given = table("parameters", parameters)
-        values = {checked_name(name): exact_number(f"parameter {name}", value) for name, value in given.items()}
-        a, b, known = formula_list("state", state), formula_list("meter", meter), Known.read(interval, inputs)
+        values = {
+            checked_name(name): exact_number(f"parameter {name}", value)
+            for name, value in given.items()
+        }
+        a, b, known = (
+            formula_list("state", state),
+            formula_list("meter", meter),
+            Known.read(interval, inputs),
+        )
         used = {name for formula in (*a, *b) for name in names_in(formula)}
         named = _symbols(symbols, [*values, *known.inputs], used, len(a))
         x, v, w = (tuple(symbol(name) for name in named[key]) for key in "xvw")
         if len(x) != len(a):
-            raise ModelError(f"{len(a)} state equation(s) but {len(x)} state symbol(s) {named['x']}; there must be one each")
+            raise ModelError(
+                f"{len(a)} state equation(s) but {len(x)} state symbol(s) {named['x']}; there "
+                f"must be one each"
+            )
         of_step = known.names([*values, *by_name(x, v, w)])
         constants = {name: symbol(name) for name in values} | of_step
         change_v, state_noise = varying_law("state_noise", state_noise, v, constants)
         change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants)
-        state_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]).subs(change_v)
-        meter_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]).subs(change_w)
+        state_equation = sp.ImmutableMatrix(
+            [read(f, constants | by_name(x, v), "state") for f in a]
+        ).subs(change_v)
+        meter_equation = sp.ImmutableMatrix(
+            [read(f, constants | by_name(x, w), "meter") for f in b]
+        ).subs(change_w)
         model = cls(
             state_equation,
             meter_equation,
@@ -170,12 +192,18 @@ class Model:
         if angles is None:
             warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
             warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
-        elif not (isinstance(angles, Mapping) and "y" in angles):  # which says all that is to be said of the meter
-            warn_of_meters(dict(zip(model.measured, model.meter_equation, strict=True)), model.angles, x)
+        # which says all that is to be said of the meter
+        elif not (isinstance(angles, Mapping) and "y" in angles):
+            warn_of_meters(
+                dict(zip(model.measured, model.meter_equation, strict=True)), model.angles, x
+            )
         warn_of_degrees("the prior mean", model.prior.mean, [s.name for s in x], model.angles.x)
         model._check()
         if not model.meter_equation.has(*x):
-            raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")
+            raise ModelError(
+                f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: "
+                f"nothing to filter"
+            )
         return model
 
     def _check(self) -> None:
@@ -204,10 +232,12 @@ class Model:
         return {symbol(name): value for name, value in self.parameters.items()}
 
     def difference_equation(self, what: str) -> sp.ImmutableMatrix:
-        """a(x, v); ModelError if the model moves in continuous time, of which `what` knows nothing."""
+        """a(x, v); ModelError if the model moves in continuous time, of which `what` knows
+        nothing."""
         if self.between is not None:
             raise ModelError(
-                f"{what} needs a difference equation, and {self} moves in continuous time between its measurements; filters "
+                f"{what} needs a difference equation, and {self} moves in continuous time between "
+                f"its measurements; filters "
                 "of structural functions, duof(model) and particle(model) take it"
             )
         return self.state_equation
@@ -223,23 +253,34 @@ class Model:
         return _measured(self.p)
 
     def replace(self, **parameters: float) -> Model:
-        """The same model with some parameters changed: ``model.replace(f=0.2)``; ModelError where it cannot be computed."""
+        """The same model with some parameters changed: ``model.replace(f=0.2)``; ModelError where
+        it cannot be computed."""
         unknown = sorted(set(parameters) - set(self.parameters))
         if unknown:
-            raise ModelError(f"the model has no parameter {', '.join(unknown)}; it has {', '.join(self.parameters) or 'none'}")
-        values = dict(self.parameters) | {name: exact_number(f"parameter {name}", value) for name, value in parameters.items()}
+            raise ModelError(
+                f"the model has no parameter {', '.join(unknown)}; it has "
+                f"{', '.join(self.parameters) or 'none'}"
+            )
+        values = dict(self.parameters) | {
+            name: exact_number(f"parameter {name}", value) for name, value in parameters.items()
+        }
         changed = dataclasses.replace(self, parameters=values)
         changed._check()
         return changed
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any]) -> Model:
-        """The model of a table such as [variants.53]: its keys are the arguments of `define`, but for title and steps."""
+        """The model of a table such as [variants.53]: its keys are the arguments of `define`, but
+        for title and steps."""
         try:
             state, meter = table["state"], table["meter"]
         except (KeyError, TypeError):
             raise ModelError(f"expected a table with state and meter, got {shown(table)}") from None
-        options = {key: value for key, value in table.items() if key not in ("state", "meter", "parameters", *OF_A_VARIANT)}
+        options = {
+            key: value
+            for key, value in table.items()
+            if key not in ("state", "meter", "parameters", *OF_A_VARIANT)
+        }
         return cls.define(state, meter, table.get("parameters"), **options)
 
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
@@ -251,21 +292,31 @@ class Model:
             A name that is no input of the model, values that are no finite numbers.
         """
         if unknown := sorted(set(inputs) - {*self.known.inputs, "t"}):
-            raise ModelError(f"the model has no input {', '.join(unknown)}; it has {', '.join(self.known.inputs) or 'none'}")
+            raise ModelError(
+                f"the model has no input {', '.join(unknown)}; it has "
+                f"{', '.join(self.known.inputs) or 'none'}"
+            )
         given = Known.read(self.known.interval, inputs).inputs
-        return dataclasses.replace(self, known=dataclasses.replace(self.known, inputs={**self.known.inputs, **given}))
+        return dataclasses.replace(
+            self, known=dataclasses.replace(self.known, inputs={**self.known.inputs, **given})
+        )
 
     def latex(self, values: bool = True, indexed: bool = False) -> str:
-        """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block.
+        """The two equations, and the parameters' values unless they are not wanted, as a LaTeX
+        `aligned` block.
 
         Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
         """
-        x, v, w = ([sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in some] for some in (self.x, self.v, self.w))
+        x, v, w = (
+            [sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in some]
+            for some in (self.x, self.v, self.w)
+        )
         at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
         state, moves = [sp.latex(x) for x in self.x], self.between is not None
         meter = ["y"] if self.p == 1 else [f"y_{{{i + 1}}}" for i in range(self.p)]
         lines = [
-            rf"{rf'd{name}/dt' if moves else with_index(name, 'k+1')} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+            rf"{rf'd{name}/dt' if moves else with_index(name, 'k+1')} &= "
+            rf"{formula_latex(formula.xreplace(at_k), x, v)}"
             for name, formula in zip(state, self.state_equation, strict=True)
         ]
         lines += [
@@ -278,7 +329,8 @@ class Model:
         ]
         if values:
             lines += [
-                rf"{sp.latex(name)} &= {number_latex(float(value))}" for name, value in self.values.items()
+                rf"{sp.latex(name)} &= {number_latex(float(value))}"
+                for name, value in self.values.items()
             ] + self.known.latex()
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
@@ -288,11 +340,21 @@ class Model:
     @cached_property
     def _text(self) -> str:
         rate = "{}'" if self.between is None else "d{}/dt"
-        a = ", ".join(f"{rate.format(name)} = {formula}" for name, formula in zip(self.x, self.state_equation, strict=True))
-        b = ", ".join(f"{name} = {formula}" for name, formula in zip(self.measured, self.meter_equation, strict=True))
+        a = ", ".join(
+            f"{rate.format(name)} = {formula}"
+            for name, formula in zip(self.x, self.state_equation, strict=True)
+        )
+        b = ", ".join(
+            f"{name} = {formula}"
+            for name, formula in zip(self.measured, self.meter_equation, strict=True)
+        )
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
-        angles = ", ".join([self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y])
-        inputs = ", ".join(f"{name} ({len(sequence)} values)" for name, sequence in self.known.inputs.items())
+        angles = ", ".join(
+            [self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y]
+        )
+        inputs = ", ".join(
+            f"{name} ({len(sequence)} values)" for name, sequence in self.known.inputs.items()
+        )
         parts = [values, f"angles {angles}" if angles else "", f"inputs {inputs}" if inputs else ""]
         return f"Model({a}, {b}{''.join(f'; {part}' for part in parts if part)})"
 
@@ -301,30 +363,45 @@ def _measured(p: int) -> list[str]:
     return ["y"] if p == 1 else [f"y{i + 1}" for i in range(p)]
 
 
-def _symbols(symbols: Mapping[str, Names] | None, values: Sequence[str], used: set[str], n: int) -> dict[str, list[str]]:
-    """Names of the state components and noises: given, or x, v, w with numbers as the formulas use them."""
+def _symbols(
+    symbols: Mapping[str, Names] | None, values: Sequence[str], used: set[str], n: int
+) -> dict[str, list[str]]:
+    """Names of the state components and noises: given, or x, v, w with numbers as the formulas use
+    them."""
     given = table("symbols", symbols)
     if set(given) - set("xvw"):
-        raise ModelError(f"`symbols` has the keys x, v, w, not {', '.join(sorted(set(given) - set('xvw')))}")
+        raise ModelError(
+            f"`symbols` has the keys x, v, w, not {', '.join(sorted(set(given) - set('xvw')))}"
+        )
     result = {}
     for key in "xvw":
         if key in given:
             listed = [given[key]] if isinstance(given[key], str) else given[key]
             if not isinstance(listed, Sequence):
                 raise ModelError(
-                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {shown(listed)}'
+                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", '
+                    f'"{key}2"], got {shown(listed)}'
                 )
             names: list[str] = [*listed]
         elif key == "x":
             names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
         else:
-            numbers = [int(name[1:]) for name in used - set(values) if re.fullmatch(key + r"[1-9][0-9]?", name)]
+            numbers = [
+                int(name[1:])
+                for name in used - set(values)
+                if re.fullmatch(key + r"[1-9][0-9]?", name)
+            ]
             names = [f"{key}{i + 1}" for i in range(max(numbers))] if numbers else [key]
         if not names and key != "x":
-            raise ModelError(f"`symbols` names no {key}; leave the key out, or give at least one name")
+            raise ModelError(
+                f"`symbols` names no {key}; leave the key out, or give at least one name"
+            )
         result[key] = [checked_name(name) for name in names]
     every = [name for names in result.values() for name in names] + [*values]
     twice = sorted({name for name in every if every.count(name) > 1})
     if twice:
-        raise ModelError(f"{', '.join(twice)} named twice: state, noises, parameters and inputs need different names")
+        raise ModelError(
+            f"{', '.join(twice)} named twice: state, noises, parameters and inputs need different "
+            f"names"
+        )
     return result

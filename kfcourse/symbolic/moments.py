@@ -8,8 +8,9 @@ has Gaussian moments in closed form, in any dimension, because an exponential on
 
     M[q(x) exp(a^T x)] = exp(a^T m + a^T P a / 2) M[q(m + P a + delta)],   delta ~ N(0, P)
 
-and the moments of a Gaussian follow one from another (Stein's lemma, `_polynomial_mean`).  Covariances are
-assembled term by term from differences that vanish symbolically, never as M[fg] - M[f] M[g]: a
+and the moments of a Gaussian follow one from another (Stein's lemma, `_polynomial_mean`).
+Covariances are assembled term by term from differences that vanish symbolically, never as M[fg] -
+M[f] M[g]: a
 large mean or a small variance then loses no digits in floating point.
 """
 
@@ -49,7 +50,8 @@ class GaussianMoments:
     Raises
     ------
     ValueError
-        Sizes that differ, a covariance that is not symmetric; from its methods, a symbol with a variable's name that is another.
+        Sizes that differ, a covariance that is not symmetric; from its methods, a symbol with a
+        variable's name that is another.
 
     Examples
     --------
@@ -73,11 +75,15 @@ class GaussianMoments:
         n = len(self.variables)
         if len(self.mean) != n or self.cov.shape != (n, n) or not self.cov.is_symmetric():
             got = f"got {self.mean.T} and {self.cov}"
-            raise ValueError(f"{n} variable(s) need as many means, and a symmetric covariance {n} x {n}; {got}")
+            raise ValueError(
+                f"{n} variable(s) need as many means, and a symmetric covariance {n} x {n}; {got}"
+            )
 
     def mean_of(self, function: sp.Expr) -> sp.Expr:
         """M[function(x)]; NoClosedForm names the term if there is none."""
-        return _real(sum((self._mean_of_term(t) for t in decompose(function, self.variables)), sp.S.Zero))
+        return _real(
+            sum((self._mean_of_term(t) for t in decompose(function, self.variables)), sp.S.Zero)
+        )
 
     def covariance(self, left: sp.Expr, right: sp.Expr) -> sp.Expr:
         """Cov(left(x), right(x)) = M[left right] - M[left] M[right], without cancellation."""
@@ -95,10 +101,17 @@ class GaussianMoments:
         #                    = scale(s) scale(t) ((e^{a^T P b} - 1) Q_st + (Q_st - Q_s Q_t))
         both = tuple(a + b for a, b in zip(s.rate, t.rate, strict=True))
         q_st = self._polynomial_mean(s.polynomial * t.polynomial, both)
-        q_s, q_t = self._polynomial_mean(s.polynomial, s.rate), self._polynomial_mean(t.polynomial, t.rate)
+        q_s, q_t = (
+            self._polynomial_mean(s.polynomial, s.rate),
+            self._polynomial_mean(t.polynomial, t.rate),
+        )
         exponent = sp.expand((sp.Matrix(s.rate).T * self.cov * sp.Matrix(t.rate))[0])
         difference = sp.expand(q_st - q_s * q_t)
-        return self._scale(s.rate) * self._scale(t.rate) * (_exp_minus_one(exponent) * q_st + difference)
+        return (
+            self._scale(s.rate)
+            * self._scale(t.rate)
+            * (_exp_minus_one(exponent) * q_st + difference)
+        )
 
     def _scale(self, rate: tuple[sp.Expr, ...]) -> sp.Expr:
         """exp(a^T m + a^T P a / 2), the imaginary part of the exponent as cosine and sine."""
@@ -106,7 +119,8 @@ class GaussianMoments:
         return _cis(sp.expand((a.T * self.mean + a.T * self.cov * a / 2)[0]))
 
     def _polynomial_mean(self, polynomial: sp.Expr, rate: tuple[sp.Expr, ...]) -> sp.Expr:
-        """M[polynomial(x)], x ~ N(s, P), s = m + P a, by Stein's lemma: M[x_i f] = s_i M[f] + sum_j P_ij M[df/dx_j]."""
+        """M[polynomial(x)], x ~ N(s, P), s = m + P a, by Stein's lemma: M[x_i f] = s_i M[f] + sum_j
+        P_ij M[df/dx_j]."""
         shift = self.mean + self.cov * sp.Matrix(rate)
 
         @cache
@@ -125,7 +139,9 @@ class GaussianMoments:
             return sp.expand(total)
 
         terms = sp.Poly(polynomial, *self.variables).terms()
-        return sp.expand(sum((coefficient * moment(powers) for powers, coefficient in terms), sp.S.Zero))
+        return sp.expand(
+            sum((coefficient * moment(powers) for powers, coefficient in terms), sp.S.Zero)
+        )
 
 
 def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
@@ -134,13 +150,20 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
     Raises
     ------
     NoClosedForm
-        For a term that is not a polynomial times exponentials, sines and cosines of linear arguments: none other is looked
-        for, though some have a closed form (exp(-x**2), abs(x)).
+        For a term that is not a polynomial times exponentials, sines and cosines of linear
+        arguments: none other is looked for, though some have a closed form (exp(-x**2), abs(x)).
     """
 
     names = {x.name for x in variables}
-    if strange := [symbol for symbol in sp.sympify(function).free_symbols - {*variables} if symbol.name in names]:
-        raise ValueError(f"{strange[0]} in {function} is not the variable of that name: make both alike, such as real=True")
+    if strange := [
+        symbol
+        for symbol in sp.sympify(function).free_symbols - {*variables}
+        if symbol.name in names
+    ]:
+        raise ValueError(
+            f"{strange[0]} in {function} is not the variable of that name: make both alike, such "
+            f"as real=True"
+        )
 
     # Hyperbolic and trigonometric functions of x become exponentials; those of parameters stay.
     def with_variables(e: sp.Basic) -> bool:
@@ -174,7 +197,9 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
         rate = tuple(sp.expand(sp.diff(exponent, x)) for x in variables)
         if any(r.has(*variables) for r in rate):
             raise _no_closed_form(sp.exp(exponent), function)
-        constant = sp.expand(exponent - sum((r * x for r, x in zip(rate, variables, strict=True)), sp.S.Zero))
+        constant = sp.expand(
+            exponent - sum((r * x for r, x in zip(rate, variables, strict=True)), sp.S.Zero)
+        )
         if constant.has(*variables):  # atan2(x, x), whose slope is zero
             raise _no_closed_form(sp.exp(exponent), function)
         collected[rate] = collected.get(rate, sp.S.Zero) + polynomial * _cis(constant)
@@ -213,7 +238,8 @@ def _cis(exponent: sp.Expr) -> sp.Expr:
 
 
 def _exp_minus_one(exponent: sp.Expr) -> sp.Expr:
-    """exp(u + iv) - 1 = expm1(u) cos v - 2 sin(v/2)^2 + i e^u sin v, exact for small u and v too."""
+    """exp(u + iv) - 1 = expm1(u) cos v - 2 sin(v/2)^2 + i e^u sin v, exact for small u and v
+    too."""
     re, im = exponent.as_real_imag()
     real = (expm1(re) if re != 0 else sp.S.Zero) * sp.cos(im) - 2 * sp.sin(im / 2) ** 2
     return real + sp.I * sp.exp(re) * sp.sin(im)
@@ -221,12 +247,15 @@ def _exp_minus_one(exponent: sp.Expr) -> sp.Expr:
 
 def _real(expression: sp.Expr) -> sp.Expr:
     """The real part; the imaginary parts of conjugate terms cancel by construction."""
-    real = sp.expand(expression if not expression.has(sp.I) else sp.expand(expression).as_real_imag()[0])
+    real = sp.expand(
+        expression if not expression.has(sp.I) else sp.expand(expression).as_real_imag()[0]
+    )
     return real.replace(lambda e: e.is_Mul and e.has(expm1), _bounded)
 
 
 def _bounded(term: sp.Mul) -> sp.Expr:
-    """exp(-u) expm1(u) as -expm1(-u): equal, but neither factor can overflow for a large variance u."""
+    """exp(-u) expm1(u) as -expm1(-u): equal, but neither factor can overflow for a large variance
+    u."""
     for factor in term.args:
         inverse = sp.exp(-factor.args[0]) if isinstance(factor, expm1) else None
         if inverse in term.args:

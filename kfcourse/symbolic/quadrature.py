@@ -1,9 +1,10 @@
 """Structural functions by quadrature over a normal law, for models without a closed form.
 
-A noise that is added with a constant factor, and is correlated with no noise of another kind, needs no points: its mean
-and covariance are added.  Nor does the Gauss-Hermite rule need any for noises with factors that depend on the state alone: at
-each point of the state their mean and covariance are known, Cov y = Cov M[y|x] + M Cov[y|x].  The points spread over the state
-and over the other noises, s variables together.
+A noise that is added with a constant factor, and is correlated with no noise of another kind, needs
+no points: its mean and covariance are added.  Nor does the Gauss-Hermite rule need any for noises
+with factors that depend on the state alone: at each point of the state their mean and covariance
+are known, Cov y = Cov M[y|x] + M Cov[y|x].  The points spread over the state and over the other
+noises, s variables together.
 """
 
 from __future__ import annotations
@@ -40,30 +41,34 @@ from kfcourse.symbolic.structure import Structure, of_steps
 Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
 
 MOST_POINTS = 100_000
-# Means may change by this part of a standard deviation when the order is doubled, covariances by this part of themselves.
+# Means may change by this part of a standard deviation when the order is doubled, covariances by
+# this part of themselves.
 CONVERGED = 0.1
 EPS = np.finfo(float).eps
-# Variances are enlarged by this part of themselves (2e-14), so that a root has pivots of 1e-7 at least, and its inverse half of
-# the digits: in directions that a singular covariance knows exactly there would be no points, and no slope.
+# Variances are enlarged by this part of themselves (2e-14), so that a root has pivots of 1e-7 at
+# least, and its inverse half of the digits: in directions that a singular covariance knows exactly
+# there would be no points, and no slope.
 UNSEEN = 2 * SINGULAR**2 * EPS
 LOST = 4 * EPS  # what is not above this part of the numbers that it is a difference of is rounding
 
 
 class QuadratureWarning(UserWarning):
-    """The points do not integrate a function of the model at its prior law: the structural functions may be far off."""
+    """The points do not integrate a function of the model at its prior law: the structural
+    functions may be far off."""
 
 
 def unscented(model: Model, kappa: float | None = None) -> Structure:
     """Structural functions by the unscented transform.
 
-    2 s + 1 points, the mean and +-sqrt(s + kappa) times the columns of the lower triangular root of the covariance.  Means are
-    exact for quadratic functions, covariances for linear ones only: no point lies off the axes, so a product like x^2 w is not
-    seen.
+    2 s + 1 points, the mean and +-sqrt(s + kappa) times the columns of the lower triangular root of
+    the covariance.  Means are exact for quadratic functions, covariances for linear ones only: no
+    point lies off the axes, so a product like x^2 w is not seen.
 
     Parameters
     ----------
     kappa : float, optional
-        The spread is s + kappa; kappa = 3 - s by default (Julier and Uhlmann), but not below 0, so that no weight is negative.
+        The spread is s + kappa; kappa = 3 - s by default (Julier and Uhlmann), but not below 0, so
+        that no weight is negative.
 
     Raises
     ------
@@ -73,7 +78,8 @@ def unscented(model: Model, kappa: float | None = None) -> Structure:
     Warns
     -----
     QuadratureWarning
-        A function is not finite at a point of the prior law, or too rough for its moments there to be found by points.
+        A function is not finite at a point of the prior law, or too rough for its moments there to
+        be found by points.
     """
 
     expect(model, Model, "unscented")
@@ -93,7 +99,8 @@ def unscented(model: Model, kappa: float | None = None) -> Structure:
 
 
 def gauss_hermite(model: Model, order: int = 5) -> Structure:
-    """Structural functions by the Gauss-Hermite product rule; exact for polynomials below degree 2*order.
+    """Structural functions by the Gauss-Hermite product rule; exact for polynomials below degree
+    2*order.
 
     `order` points an axis, so order**s evaluations, s = `axes(model)`.
 
@@ -105,25 +112,32 @@ def gauss_hermite(model: Model, order: int = 5) -> Structure:
     Warns
     -----
     QuadratureWarning
-        A function is not finite at a point of the prior law, or twice as many points an axis give other moments there.
+        A function is not finite at a point of the prior law, or twice as many points an axis give
+        other moments there.
     """
     expect(model, Model, "gauss_hermite")
     if model.between is not None:
         return model.between.structure(model, partial(gauss_hermite, order=order))
     if not isinstance(order, int | np.integer) or order < 2:
-        raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, a whole number, got {order!r}")
+        raise ModelError(
+            f"Gauss-Hermite quadrature needs an order of at least 2, a whole number, got {order!r}"
+        )
     return _checked("gauss-hermite", model, product_rule(order), _sides(model), order)
 
 
 def axes(model: Model) -> int:
-    """Over how many variables the Gauss-Hermite rule spreads: the state, and the noises of an equation that need points."""
+    """Over how many variables the Gauss-Hermite rule spreads: the state, and the noises of an
+    equation that need points."""
     return max(side.axes for side in _sides(model))
 
 
 def product_rule(order: int) -> Rule:
     def rule(size: int) -> tuple[Array, Array]:
         if order**size > MOST_POINTS:
-            raise ModelError(f"{order} points on each of {size} axes are too many; lower the order or use unscented(model)")
+            raise ModelError(
+                f"{order} points on each of {size} axes are too many; lower the order or use "
+                f"unscented(model)"
+            )
         nodes, weights = np.polynomial.hermite_e.hermegauss(order)
         points = np.array(list(cartesian(nodes, repeat=size)))
         return points, np.prod(list(cartesian(weights / weights.sum(), repeat=size)), axis=1)
@@ -132,7 +146,8 @@ def product_rule(order: int) -> Rule:
 
 
 class _Side(NamedTuple):
-    """An equation of the model as f(x, noises, k), and what noises without points add to the covariance."""
+    """An equation of the model as f(x, noises, k), and what noises without points add to the
+    covariance."""
 
     function: Callable[..., Array]
     size: int
@@ -144,7 +159,8 @@ class _Side(NamedTuple):
     angles: Components  # components of the function's value
 
     def added(self, x: Array, weights: Array, k: int | None) -> Array:
-        """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given x."""
+        """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given
+        x."""
         if not self.of_state:
             return symmetric(self.factors.at(k)()[0])
         covs = np.broadcast_to(self.factors.at(k)(x)[0], (*x.shape[:-1], self.size, self.size))
@@ -152,22 +168,46 @@ class _Side(NamedTuple):
 
 
 def _sides(model: Model, with_factors: bool = False) -> tuple[_Side, _Side]:
-    """Object and meter, with points for the noises that do not enter linearly, or for those `with_factors` of the state, too."""
+    """Object and meter, with points for the noises that do not enter linearly, or for those
+    `with_factors` of the state, too."""
     state, meter = compile_model(model)
     return (
-        _side(state, model.state_equation, model.v, model.state_noise, model.angles.x, model, with_factors),
-        _side(meter, model.meter_equation, model.w, model.meter_noise, model.angles.y, model, with_factors),
+        _side(
+            state,
+            model.state_equation,
+            model.v,
+            model.state_noise,
+            model.angles.x,
+            model,
+            with_factors,
+        ),
+        _side(
+            meter,
+            model.meter_equation,
+            model.w,
+            model.meter_noise,
+            model.angles.y,
+            model,
+            with_factors,
+        ),
     )
 
 
-def _side(function, formulas, noises, law: Gaussian, angles: Components, model: Model, with_factors: bool) -> _Side:
+def _side(
+    function, formulas, noises, law: Gaussian, angles: Components, model: Model, with_factors: bool
+) -> _Side:
     size, count = len(formulas), len(noises)
-    factors = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if noises else sp.zeros(size, 0)
+    factors = (
+        sp.Matrix(formulas).subs(model.values).jacobian(list(noises))
+        if noises
+        else sp.zeros(size, 0)
+    )
     varying = (*model.x, *noises) if with_factors else noises
     columns = [factors[:, j] for j in range(count)]
     other = np.array(
         [
-            (column.has(*varying) and column.applyfunc(sp.simplify).has(*varying)) or decides(formulas, [noise])
+            (column.has(*varying) and column.applyfunc(sp.simplify).has(*varying))
+            or decides(formulas, [noise])
             for column, noise in zip(columns, noises, strict=True)
         ],
         dtype=bool,
@@ -181,28 +221,36 @@ def _side(function, formulas, noises, law: Gaussian, angles: Components, model: 
     stepwise = Stepwise.compile(model.known, "added", arguments, {"added": added}, [*arguments])
     root = np.zeros((count, int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Side(function, size, model.n + root.shape[1], law.mean, root, stepwise, bool(arguments), angles)
+    return _Side(
+        function, size, model.n + root.shape[1], law.mean, root, stepwise, bool(arguments), angles
+    )
 
 
 def _checked(name: str, model: Model, rule: Rule, sides: Sequence[_Side], order: int) -> Structure:
-    """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and of twice the order."""
+    """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and
+    of twice the order."""
     structure = _by_points(name, model, rule, sides)
     with np.errstate(all="ignore"):
         if not all(np.isfinite(moment).all() for _, moment, *_ in _prior_moments(structure)):
             _warn(f"{name}: a function of {model} is not finite at the points of the prior law", 4)
         elif (2 * order) ** max(side.axes for side in sides) <= MOST_POINTS:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", QuadratureWarning)  # these points are not those that the filter uses
+                # these points are not those that the filter uses
+                warnings.simplefilter("ignore", QuadratureWarning)
                 rules = (product_rule(order), product_rule(2 * order))
-                coarse, fine = (_prior_moments(_by_points(name, model, each, sides)) for each in rules)
+                coarse, fine = (
+                    _prior_moments(_by_points(name, model, each, sides)) for each in rules
+                )
             for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
                 more = near(more, less, angles)
                 apart = np.nan_to_num(np.abs(more - less) / scale, nan=np.inf)
                 if apart.max() > CONVERGED:
                     worst = np.unravel_index(np.argmax(apart), less.shape)
                     _warn(
-                        f"{name}: the {what} of {model} at the prior law is {less[worst]:.4g} with {order} points an axis and "
-                        f"{more[worst]:.4g} with {2 * order}: it may be infinite, or the function too rough for these points",
+                        f"{name}: the {what} of {model} at the prior law is {less[worst]:.4g} "
+                        f"with {order} points an axis and "
+                        f"{more[worst]:.4g} with {2 * order}: it may be infinite, or the function "
+                        f"too rough for these points",
                         4,
                     )
                     break
@@ -210,14 +258,21 @@ def _checked(name: str, model: Model, rule: Rule, sides: Sequence[_Side], order:
 
 
 def _prior_moments(structure: Structure) -> list[tuple[str, Array, Array, Components]]:
-    """Name, value and natural size of the moments at the prior law, and which components are angles."""
+    """Name, value and natural size of the moments at the prior law, and which components are
+    angles."""
     first, angles, moments = structure.at(0), structure.model.angles, []
     h, _, F, _ = first.measure(*structure.model.prior)
-    laws = (("next state", first.predict(*structure.model.prior), angles.x), ("measurement", Gaussian(h, F), angles.y))
+    laws = (
+        ("next state", first.predict(*structure.model.prior), angles.x),
+        ("measurement", Gaussian(h, F), angles.y),
+    )
     for what, (mean, cov), which in laws:
         # rounding: what does not vary has no size of its own
         sd = np.sqrt(np.maximum(np.diagonal(cov), 0.0)) + 1e-12 * (1 + np.abs(mean))
-        moments += [(f"mean of the {what}", mean, sd, which), (f"covariance of the {what}", cov, sd[:, None] * sd, ())]
+        moments += [
+            (f"mean of the {what}", mean, sd, which),
+            (f"covariance of the {what}", cov, sd[:, None] * sd, ()),
+        ]
     return moments
 
 
@@ -226,18 +281,22 @@ def _warn(text: str, stacklevel: int) -> None:
 
 
 def _warn_of_turns(name: str, model: Model, deviation: Array) -> None:
-    """QuadratureWarning if points of an angle go round the circle: their mean is then that of other angles."""
+    """QuadratureWarning if points of an angle go round the circle: their mean is then that of other
+    angles."""
     for i in model.angles.x:
         if (widest := np.nanmax(np.abs(deviation[..., i]), initial=0.0)) > np.pi:
             _warn(
-                f"{name}: points of the angle {model.x[i]} lie {widest:.3g} to either side of its mean, more than half a turn: "
-                "its variance is too large for these points; take linearised(model), or a smaller prior variance",
+                f"{name}: points of the angle {model.x[i]} lie {widest:.3g} to either side of its "
+                f"mean, more than half a turn: "
+                "its variance is too large for these points; take linearised(model), or a smaller "
+                "prior variance",
                 3,
             )
 
 
 def _lower_root(cov: Array) -> tuple[Array, Array]:
-    """The Cholesky factor, and which components (..., n) the earlier ones determine: their columns are those of I."""
+    """The Cholesky factor, and which components (..., n) the earlier ones determine: their columns
+    are those of I."""
     n = cov.shape[-1]
     try:
         return np.linalg.cholesky(cov), np.zeros(cov.shape[:-1], dtype=bool)
@@ -246,7 +305,11 @@ def _lower_root(cov: Array) -> tuple[Array, Array]:
     for j in range(n):
         pivot = rest[..., j, j]
         known[..., j] = ~(pivot > n * EPS * cov[..., j, j])
-        column = np.where(np.arange(n) >= j, rest[..., :, j] / np.sqrt(np.where(known[..., j], 1.0, pivot))[..., None], 0.0)
+        column = np.where(
+            np.arange(n) >= j,
+            rest[..., :, j] / np.sqrt(np.where(known[..., j], 1.0, pivot))[..., None],
+            0.0,
+        )
         root[..., :, j] = np.where(known[..., j, None], np.eye(n)[j], column)
         column = np.where(known[..., j, None], 0.0, column)
         rest = rest - column[..., :, None] * column[..., None, :]
@@ -254,13 +317,17 @@ def _lower_root(cov: Array) -> tuple[Array, Array]:
 
 
 def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> Structure:
-    """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
+    """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights
+    (q,))."""
     n, measurement = model.n, measurement_of(model.angles.y)
     state, meter = [(side, *rule(side.axes)) for side in sides]
 
-    def propagate(side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None):
-        """Mean of the function, its deviations from that at the points (0 exactly for what does not vary), deviations of x,
-        the root of cov with 1 for what is known, and the covariance that noises without points add."""
+    def propagate(
+        side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None
+    ):
+        """Mean of the function, its deviations from that at the points (0 exactly for what does not
+        vary), deviations of x, the root of cov with 1 for what is known, and the covariance that
+        noises without points add."""
         root, known = _lower_root(cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n)))
         dx = np.where(known[..., None, :], 0.0, points[:, :n]) @ transpose(root)
         _warn_of_turns(name, model, dx)
@@ -274,18 +341,24 @@ def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> S
         added = side.added(x, weights, k)
         return on_circle(middle + shift, side.angles), off - shift[..., None, :], dx, root, added
 
-    def regressed(side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None):
-        """Mean of the function, its slopes by x, and the covariance of what is not linear in x: regressions on the points."""
+    def regressed(
+        side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None
+    ):
+        """Mean of the function, its slopes by x, and the covariance of what is not linear in x:
+        regressions on the points."""
         value, deviation, dx, root, added = propagate(side, points, weights, mean, cov, k)
         weighed = deviation * weights[:, None]
         cross = transpose(weighed) @ points[:, :n]
-        # A sum over points that ought to cancel leaves some units of precision: as a gain a measurement in disguise.
+        # A sum over points that ought to cancel leaves some units of precision: as a gain a
+        # measurement in disguise.
         variance = np.maximum((weighed * deviation).sum(axis=-2), 0.0)
         cross = np.where(np.abs(cross) <= LOST * np.sqrt(variance)[..., None], 0.0, cross)
         slopes = transpose(np.linalg.solve(transpose(root), transpose(cross)))
         explained = dx @ transpose(slopes)
         rest = deviation - explained  # no difference of nearly equal matrices
-        size = (np.abs(deviation) + np.abs(explained)).max(axis=-2, keepdims=True) + np.abs(value)[..., None, :]
+        size = (np.abs(deviation) + np.abs(explained)).max(axis=-2, keepdims=True) + np.abs(value)[
+            ..., None, :
+        ]
         rest = np.where(np.abs(rest) <= LOST * size, 0.0, rest)  # rounding is no noise of the meter
         return value, slopes, _weighted(weights, rest) + added
 

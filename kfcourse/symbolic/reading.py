@@ -1,6 +1,7 @@
 """What people write of a model, checked and read: names, numbers, formulas, laws.
 
-`Model` and `ContinuousModel` are built from these; whatever does not fit is a `ModelError` that says what to change.
+`Model` and `ContinuousModel` are built from these; whatever does not fit is a `ModelError` that
+says what to change.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ def by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:
 
 
 def shown(value: Any) -> str:
-    """What people wrote, for a message: not too long, and any number (Python prints none of more than 4300 digits)."""
+    """What people wrote, for a message: not too long, and any number (Python prints none of more
+    than 4300 digits)."""
     try:
         text = repr(value)
     except ValueError:
@@ -56,7 +58,11 @@ def checked_name(name: str) -> str:
 def exact_number(what: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
     try:
-        number = float(value) if isinstance(value, int | float | np.integer | np.floating | sp.Rational) else float("nan")
+        number = (
+            float(value)
+            if isinstance(value, int | float | np.integer | np.floating | sp.Rational)
+            else float("nan")
+        )
     except OverflowError:
         number = float("inf")
     if isinstance(value, bool) or not np.isfinite(number):
@@ -74,14 +80,18 @@ def exact_matrix(array: Array) -> sp.ImmutableMatrix:
 
 def formula_list(what: str, formulas: Formulas) -> list[Formula]:
     """One formula or several as a list."""
-    if isinstance(formulas, str) or (isinstance(formulas, sp.Expr) and not isinstance(formulas, sp.MatrixBase)):
+    if isinstance(formulas, str) or (
+        isinstance(formulas, sp.Expr) and not isinstance(formulas, sp.MatrixBase)
+    ):
         return [formulas]
     result = list(formulas) if isinstance(formulas, Sequence | sp.MatrixBase) else [formulas]
     if not result:
         raise ModelError(f"`{what}` holds no formula")
     for formula in result:
         if not isinstance(formula, str | sp.Expr):
-            raise ModelError(f"`{what}` must be a formula or a list of formulas, got {shown(formula)}")
+            raise ModelError(
+                f"`{what}` must be a formula or a list of formulas, got {shown(formula)}"
+            )
     return result
 
 
@@ -99,7 +109,10 @@ def read(formula: Formula, known: dict[str, sp.Symbol], what: str) -> sp.Expr:
     # Symbols of the caller are recognised by name, whatever their assumptions.
     unknown = sorted(names_in(formula) - set(known))
     if unknown:
-        raise ModelError(f"the {what} equation {formula} has unknown symbols {', '.join(unknown)}; known: {', '.join(known)}")
+        raise ModelError(
+            f"the {what} equation {formula} has unknown symbols {', '.join(unknown)}; known: "
+            f"{', '.join(known)}"
+        )
     return formula.subs({s: known[s.name] for s in formula.free_symbols})
 
 
@@ -107,7 +120,10 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
     """A Gaussian from {"mean": ..., "variance": ...}; standard normal for what is left out."""
     parts = table(what, given)
     if set(parts) - {"mean", "variance"}:
-        raise ModelError(f"`{what}` has the keys mean and variance, not {', '.join(sorted(set(parts) - {'mean', 'variance'}))}")
+        raise ModelError(
+            f"`{what}` has the keys mean and variance, not "
+            f"{', '.join(sorted(set(parts) - {'mean', 'variance'}))}"
+        )
     try:
         if not of_numbers([*parts.values()]):
             raise TypeError
@@ -116,13 +132,18 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
         cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
     except (TypeError, ValueError, OverflowError):
         raise ModelError(
-            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix), "
+            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: "
+            f"or a matrix), "
             f"got {', '.join(f'{key} = {shown(value)}' for key, value in parts.items())}"
         ) from None
     if cov.shape != (size, size):
-        raise ModelError(f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})")
+        raise ModelError(
+            f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})"
+        )
     if not (np.isfinite(mean).all() and np.isfinite(cov).all()):
-        raise ModelError(f"`{what}`: mean and variance must be finite, got {mean} and {cov.tolist()}")
+        raise ModelError(
+            f"`{what}`: mean and variance must be finite, got {mean} and {cov.tolist()}"
+        )
     if not np.array_equal(cov, cov.T):
         raise ModelError(f"`{what}`: the covariance matrix must be symmetric, got {cov.tolist()}")
     if not is_covariance(cov):
@@ -131,7 +152,8 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
 
 
 def of_numbers(given: Any) -> bool:
-    """Whether there are no texts and no truth values among the entries: NumPy would take "1e5" for 100000, and true for 1."""
+    """Whether there are no texts and no truth values among the entries: NumPy would take "1e5" for
+    100000, and true for 1."""
     if isinstance(given, Sequence) and not isinstance(given, str):
         return all(map(of_numbers, given))
     return not isinstance(given, str | bool | np.bool_)

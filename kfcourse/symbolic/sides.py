@@ -1,4 +1,5 @@
-"""The object or the meter of a model in symbols: its equation and Jacobians at the mean of a normal law."""
+"""The object or the meter of a model in symbols: its equation and Jacobians at the mean of a normal
+law."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from kfcourse.symbolic.structure import gaussian_symbols
 class Side:
     """The object or the meter of a model, at a normal law of the state N(mean, cov), in symbols.
 
-    value, A, B: the equation and its Jacobians by state and noise, at the mean;  D: the noise's covariance.
+    value, A, B: the equation and its Jacobians by state and noise, at the mean;  D: the noise's
+    covariance.
     """
 
     equation: sp.MatrixBase
@@ -31,11 +33,25 @@ class Side:
     @classmethod
     def of(cls, model: Model, side: str) -> Side:
         if side == "object":
-            return cls(model.state_equation, model.x, model.v, model.state_noise, *gaussian_symbols(model, "z", "p"))
-        return cls(model.meter_equation, model.x, model.w, model.meter_noise, *gaussian_symbols(model, "m", "d"))
+            return cls(
+                model.state_equation,
+                model.x,
+                model.v,
+                model.state_noise,
+                *gaussian_symbols(model, "z", "p"),
+            )
+        return cls(
+            model.meter_equation,
+            model.x,
+            model.w,
+            model.meter_noise,
+            *gaussian_symbols(model, "m", "d"),
+        )
 
     def at_mean(self, matrix: sp.MatrixBase) -> sp.Matrix:
-        point = dict(zip(self.x, self.mean, strict=True)) | dict(zip(self.noise, exact_matrix(self.law.mean), strict=True))
+        point = dict(zip(self.x, self.mean, strict=True)) | dict(
+            zip(self.noise, exact_matrix(self.law.mean), strict=True)
+        )
         return sp.Matrix(matrix.subs(point, simultaneous=True))
 
     @property
@@ -58,7 +74,9 @@ class Side:
         """Exact covariance of the equation over the law with the noise at its mean."""
         quiet = self.equation.subs(dict(zip(self.noise, exact_matrix(self.law.mean), strict=True)))
         moments = GaussianMoments(list(self.x), list(self.mean), sp.Matrix(self.cov))
-        return sp.Matrix(len(quiet), len(quiet), lambda i, j: moments.covariance(quiet[i], quiet[j]))
+        return sp.Matrix(
+            len(quiet), len(quiet), lambda i, j: moments.covariance(quiet[i], quiet[j])
+        )
 
 
 def plain(matrix: sp.MatrixBase) -> Any:

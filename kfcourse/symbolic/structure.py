@@ -2,10 +2,11 @@ r"""Structural functions: the seam between a model and every filter of the cours
 
 The first two conditional moments as functions of a Gaussian's mean and covariance,
 
-    tau(z, p), Theta(z, p)          mean and covariance of x_{k+1}  when x_k ~ N(z, p)
-    h(m, d),  G(m, d),  F(m, d)     mean of y_k, its sensitivity dh/dm, its covariance when x_k ~ N(m, d)
+    tau(z, p), Theta(z, p)     mean and covariance of x_{k+1} when x_k ~ N(z, p)
+    h(m, d), G(m, d), F(m, d)  mean of y_k, its sensitivity dh/dm, its covariance when x_k ~ N(m, d)
 
-and, for who looks back, the sensitivity A = dtau/dz.  By Stein's lemma Cov(x, y) = d G^T and Cov(x_k, x_{k+1}) = p A^T.
+and, for who looks back, the sensitivity A = dtau/dz.  By Stein's lemma Cov(x, y) = d G^T and
+Cov(x_k, x_{k+1}) = p A^T.
 
 `linearised` and `gaussian` derive them symbolically from the model; `unscented` and `gauss_hermite`
 compute them numerically, for models without a closed form.  All four give a `Structure`, and one
@@ -25,7 +26,15 @@ import sympy as sp
 
 from kfcourse.angles import Components, on_circle
 from kfcourse.errors import expect
-from kfcourse.laws import Array, Gaussian, Matrices, Measurement, Transition, Vectors, measurement_of
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Matrices,
+    Measurement,
+    Transition,
+    Vectors,
+    measurement_of,
+)
 from kfcourse.symbolic.choices import jumps, masked
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
@@ -51,7 +60,8 @@ class Structure:
     measure : callable
         (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p), R).
     transition : callable
-        (z (..., n), p (..., n, n)) -> Transition(A (..., n, n), Q): what a smoother needs of the object.
+        (z (..., n), p (..., n, n)) -> Transition(A (..., n, n), Q): what a smoother needs of the
+        object.
     formulas : StructuralFormulas or None
         The symbolic functions; None for the numerical structures.
     at_step : callable, optional
@@ -71,30 +81,46 @@ class Structure:
     def at(self, k: int) -> Structure:
         """The structural functions of step k: tau and Theta from k to k + 1; h, G, F of y_k.
 
-        Those of a model that does not depend on the step are the same at every step; those of one that does cannot be called
-        without it.
+        Those of a model that does not depend on the step are the same at every step; those of one
+        that does cannot be called without it.
         """
         return self if self.at_step is None else self.at_step(k)
 
     def __getitem__(self, function: str) -> sp.Expr | sp.MatrixBase:
-        """The formula of "tau", "Theta", "h", "G", "F", "R", "A" or "Q": an expression if scalar, else a matrix."""
+        """The formula of "tau", "Theta", "h", "G", "F", "R", "A" or "Q": an expression if scalar,
+        else a matrix."""
         formulas = self._derived()
-        matrix = getattr(formulas, function) if function in ("R", "A", "Q") else formulas.functions[function]
+        matrix = (
+            getattr(formulas, function)
+            if function in ("R", "A", "Q")
+            else formulas.functions[function]
+        )
         return matrix[0] if matrix.shape == (1, 1) else matrix
 
     def latex(self) -> str:
-        """The five functions as a LaTeX `aligned` block, parameters as symbols; matrices entry by entry."""
+        """The five functions as a LaTeX `aligned` block, parameters as symbols; matrices entry by
+        entry."""
         formulas = self._derived()
         lines = []
         for name, matrix in formulas.functions.items():
             before_state = name in ("tau", "Theta")
             arguments = formulas.state_arguments if before_state else formulas.meter_arguments
-            names = ", ".join(sp.latex(a) for a in arguments) if self.model.n == 1 else ("z, p" if before_state else "m, d")
+            names = (
+                ", ".join(sp.latex(a) for a in arguments)
+                if self.model.n == 1
+                else ("z, p" if before_state else "m, d")
+            )
             names += ", k" if self.model.timed else ""
             for i, j in cartesian(range(matrix.rows), range(matrix.cols)):
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
-                index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
+                index = (
+                    ""
+                    if len(matrix) == 1
+                    else f"_{{{i + 1}}}"
+                    if matrix.cols == 1
+                    else f"_{{{i + 1}{j + 1}}}"
+                )
                 value = f"{FUNCTION_LATEX[name]}{index}({names})"
                 first, *further = formula_lines(matrix[i, j], arguments, value)
                 lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]
@@ -103,12 +129,17 @@ class Structure:
     def source(self) -> str:
         """The generated NumPy code that runs."""
         formulas = self._derived()
-        return formulas.compiled_predict.compiled.source + "\n\n" + formulas.compiled_measure.compiled.source
+        return (
+            formulas.compiled_predict.compiled.source
+            + "\n\n"
+            + formulas.compiled_measure.compiled.source
+        )
 
     def _derived(self) -> StructuralFormulas:
         if self.formulas is None:
             raise NoClosedForm(
-                f"the {self.name} structure is computed by quadrature and has no formulas; see linearised(model), gaussian(model)"
+                f"the {self.name} structure is computed by quadrature and has no formulas; see "
+                f"linearised(model), gaussian(model)"
             )
         return self.formulas
 
@@ -155,12 +186,17 @@ class StructuralFormulas:
 
     @cached_property
     def Q(self) -> sp.ImmutableMatrix:
-        """Theta - A p A^T, the part of the next state's covariance that this state does not explain."""
+        """Theta - A p A^T, the part of the next state's covariance that this state does not
+        explain."""
         return _expanded(sp.ImmutableMatrix(self.functions["Theta"] - self.A * self.p * self.A.T))
 
     @cached_property
     def compiled_predict(self) -> Stepwise:
-        return self._compile("predict", {"z": self.z, "p": self.p}, {key: self.functions[key] for key in ("tau", "Theta")})
+        return self._compile(
+            "predict",
+            {"z": self.z, "p": self.p},
+            {key: self.functions[key] for key in ("tau", "Theta")},
+        )
 
     @cached_property
     def compiled_measure(self) -> Stepwise:
@@ -173,7 +209,9 @@ class StructuralFormulas:
     def compiled_transition(self) -> Stepwise:
         return self._compile("transition", {"z": self.z, "p": self.p}, {"A": self.A, "Q": self.Q})
 
-    def _compile(self, name: str, arguments: dict[str, sp.MatrixBase], outputs: dict[str, sp.MatrixBase]) -> Stepwise:
+    def _compile(
+        self, name: str, arguments: dict[str, sp.MatrixBase], outputs: dict[str, sp.MatrixBase]
+    ) -> Stepwise:
         numeric = {key: part.subs(self.model.values) for key, part in outputs.items()}
         return Stepwise.compile(self.model.known, name, arguments, numeric, ["z", "m", "tau", "h"])
 
@@ -194,7 +232,8 @@ class StructuralFormulas:
             self.model,
             lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
             measured,
-            lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),  # compiled where it is asked for
+            # compiled where it is asked for
+            lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),
             self,
         )
 
@@ -206,16 +245,25 @@ def of_steps(
     formulas: StructuralFormulas | None = None,
     timed: bool = False,
 ) -> Structure:
-    """The structure at every step; of what depends on the step the structure that `Structure.at` makes those of each step of."""
+    """The structure at every step; of what depends on the step the structure that `Structure.at`
+    makes those of each step of."""
 
     def refused(mean: Vectors, cov: Matrices) -> NoReturn:
-        raise ModelError(f"what is found of {model} depends on the step: say which, as in structure.at(k).predict(z, p)")
+        raise ModelError(
+            f"what is found of {model} depends on the step: say which, as in "
+            f"structure.at(k).predict(z, p)"
+        )
 
-    return Structure(name, model, refused, refused, refused, formulas, at) if timed or model.timed else at(None)
+    return (
+        Structure(name, model, refused, refused, refused, formulas, at)
+        if timed or model.timed
+        else at(None)
+    )
 
 
 def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
-    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and pi."""
+    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and
+    pi."""
     mean = law.mean if law.mean.ndim == over.ndim else np.broadcast_to(law.mean, over.shape)
     return Gaussian(on_circle(mean, angles), law.cov)
 
@@ -224,12 +272,17 @@ def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
     return list(dict.fromkeys([*mean, *cov]))
 
 
-def gaussian_symbols(model: Model, mean: str, cov: str) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
-    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12, ...
+def gaussian_symbols(
+    model: Model, mean: str, cov: str
+) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
+    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12,
+    ...
 
     A name that the model already uses gets a trailing underscore.
     """
-    taken = set(model.parameters) | {s.name for s in (*model.x, *model.v, *model.w, *model.known.symbols)}
+    taken = set(model.parameters) | {
+        s.name for s in (*model.x, *model.v, *model.w, *model.known.symbols)
+    }
 
     def fresh(name: str) -> sp.Symbol:
         while name in taken:
@@ -248,7 +301,8 @@ def linearised(model: Model) -> Structure:
     """Structural functions of the model linearised at the mean (the extended Kalman filter's).
 
     tau = a(z, m_v),  Theta = a_x p a_x^T + a_v D_v a_v^T,
-    h = b(m, m_w),  G = b_x,  F = b_x d b_x^T + b_w D_w b_w^T,   derivatives at (z, m_v) and (m, m_w)
+    h = b(m, m_w),  G = b_x,  F = b_x d b_x^T + b_w D_w b_w^T,   derivatives at (z, m_v) and (m,
+    m_w)
 
     Raises
     ------
@@ -259,8 +313,12 @@ def linearised(model: Model) -> Structure:
     if model.between is not None:
         return model.between.structure(model, linearised)
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
-    tau, A, B = _taylor(model.state_equation, model.x, z, model.v, exact_matrix(model.state_noise.mean))
-    h, H, C = _taylor(model.meter_equation, model.x, m, model.w, exact_matrix(model.meter_noise.mean))
+    tau, A, B = _taylor(
+        model.state_equation, model.x, z, model.v, exact_matrix(model.state_noise.mean)
+    )
+    h, H, C = _taylor(
+        model.meter_equation, model.x, m, model.w, exact_matrix(model.meter_noise.mean)
+    )
     functions = {
         "tau": tau,
         "Theta": A * p * A.T + B * exact_matrix(model.state_noise.cov) * B.T,
@@ -269,7 +327,9 @@ def linearised(model: Model) -> Structure:
         "F": H * d * H.T + C * exact_matrix(model.meter_noise.cov) * C.T,
     }
     # e^(a+b) stays one: a height of 6500 km over a scale of 13 km has an e^a beyond all numbers.
-    return StructuralFormulas(model, "linearised", z, p, m, d, _all_expanded(functions, power_exp=False)).structure()
+    return StructuralFormulas(
+        model, "linearised", z, p, m, d, _all_expanded(functions, power_exp=False)
+    ).structure()
 
 
 @lru_cache(maxsize=64)
@@ -278,9 +338,12 @@ def _taylor(equation, x, mean, noise, noise_mean):
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(choice, [*x, *noise]) for choice in equation.atoms(sp.Piecewise)):
+        if part.has(sp.Derivative, sp.DiracDelta) or any(
+            jumps(choice, [*x, *noise]) for choice in equation.atoms(sp.Piecewise)
+        ):
             raise NoClosedForm(
-                f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)",
+                f"{list(equation)} is not differentiable and cannot be linearised; use "
+                f"unscented(model) or gauss_hermite(model)",
                 "no_slope",
             )
     return tuple(part.subs(point, simultaneous=True) for part in parts)
@@ -301,7 +364,9 @@ def gaussian(model: Model) -> Structure:
         return model.between.structure(model, gaussian)
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
     known = model.known.symbols
-    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known)
+    tau, Theta = _moments(
+        model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known
+    )
     h, F = _moments(model.meter_equation, model.x, m, d, model.w, *_exact(model.meter_noise), known)
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
     return StructuralFormulas(model, "gaussian", z, p, m, d, _all_expanded(functions)).structure()
@@ -314,14 +379,20 @@ def _exact(law: Gaussian) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
 @lru_cache(maxsize=64)  # the same for all values of the parameters
 def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[sp.Symbol, ...]):
     """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
-    joint = GaussianMoments([*x, *noise], [*mean, *noise_mean], sp.diag(sp.Matrix(cov), sp.Matrix(noise_cov)))
+    joint = GaussianMoments(
+        [*x, *noise], [*mean, *noise_mean], sp.diag(sp.Matrix(cov), sp.Matrix(noise_cov))
+    )
     size = len(equation)
     equation, masks = masked(equation, known, [*x, *noise])
     try:
         means = sp.Matrix([joint.mean_of(formula) for formula in equation])
     except NoClosedForm as error:
-        text = reduce(lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error))
-        raise NoClosedForm(text, error.kind, **{name: part.xreplace(masks) for name, part in error.parts.items()}) from None
+        text = reduce(
+            lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error)
+        )
+        raise NoClosedForm(
+            text, error.kind, **{name: part.xreplace(masks) for name, part in error.parts.items()}
+        ) from None
     covs = sp.zeros(size, size)
     for i in range(size):
         for j in range(i, size):
@@ -330,7 +401,9 @@ def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[
 
 
 def _all_expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
-    return {name: _expanded(sp.ImmutableMatrix(matrix), **hints) for name, matrix in functions.items()}
+    return {
+        name: _expanded(sp.ImmutableMatrix(matrix), **hints) for name, matrix in functions.items()
+    }
 
 
 @lru_cache(maxsize=256)  # modes often have the same object, or the same meter, with other numbers
@@ -341,6 +414,9 @@ def _expanded(matrix: sp.ImmutableMatrix, **hints: bool) -> sp.ImmutableMatrix:
 def expect_each(structures: Sequence[Structure], what: str) -> None:
     """TypeError unless these are structural functions, a list of them."""
     if isinstance(structures, Structure):
-        raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
+        raise TypeError(
+            f"{what} expects a list of structures, one a mode, and one came: give "
+            f"[{structures.name}, ...]"
+        )
     for structure in structures:
         expect(structure, Structure, what)

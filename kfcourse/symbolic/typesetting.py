@@ -1,4 +1,5 @@
-"""Equations as LaTeX that fits a column: one line an equation where it fits, else broken between the terms of its sums."""
+"""Equations as LaTeX that fits a column: one line an equation where it fits, else broken between
+the terms of its sums."""
 
 from __future__ import annotations
 
@@ -18,7 +19,9 @@ WIDTH = 62  # symbols in a line of the page's column
 
 _OPERATORS = {"+", "-", "=", r"\cdot", r"\approx", r"\le", r"\ge"}  # with the space around them
 _TOKEN = re.compile(r"\\[a-zA-Z]+|\\.|.", re.DOTALL)
-_NAME_BEFORE_A_FACTOR = re.compile(r"(\\mathit\{[A-Za-z]+\}(?:\^\{[^{}]*\})?) (?!\\(?:right|cdot)\b)(?=[A-Za-z\\{])")
+_NAME_BEFORE_A_FACTOR = re.compile(
+    r"(\\mathit\{[A-Za-z]+\}(?:\^\{[^{}]*\})?) (?!\\(?:right|cdot)\b)(?=[A-Za-z\\{])"
+)
 _WORD_BELOW = re.compile(r"_\{([a-z]{4,})(?=[ }])")  # G_{best}: a word, no product of letters
 _WITHOUT_WIDTH = {
     r"\left",
@@ -40,14 +43,18 @@ _WITHOUT_WIDTH = {
 
 
 def equation_latex(equation: Equation, names: Mapping[Any, str] | None = None) -> str:
-    """LaTeX of side = side = ..., with `&` for an aligned environment, in several lines where it is long.
+    """LaTeX of side = side = ..., with `&` for an aligned environment, in several lines where it is
+    long.
 
     Sides that print alike are printed once.
     """
-    first, *others = (lines for lines, _ in groupby(side_lines(side, WIDTH - 6, names) for side in equation))
+    first, *others = (
+        lines for lines, _ in groupby(side_lines(side, WIDTH - 6, names) for side in equation)
+    )
     if len(first) > 1:
         raise ValueError(
-            "the left side of an equation is too long for one line: give it a name, and the formula as the right side"
+            "the left side of an equation is too long for one line: give it a name, and the "
+            "formula as the right side"
         )
     lines: list[str] = []
     line, room = first[0] + " ", WIDTH - symbols(first[0])
@@ -83,8 +90,14 @@ def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
 
 
 def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
-    """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around derivatives."""
-    settings = {"symbol_names": dict(names or {}), "diff_operator": "d", "mat_delim": "(", "fold_short_frac": False}
+    """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around
+    derivatives."""
+    settings = {
+        "symbol_names": dict(names or {}),
+        "diff_operator": "d",
+        "mat_delim": "(",
+        "fold_short_frac": False,
+    }
     return str(_Ordered(settings).doprint(expression))
 
 
@@ -95,7 +108,8 @@ def with_index(name: str, index: str) -> str:
 
 
 class Printer(LatexPrinter):
-    """SymPy's, with one letter for the identity, \\ln, and names of several letters told apart from products."""
+    """SymPy's, with one letter for the identity, \\ln, and names of several letters told apart from
+    products."""
 
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
         super().__init__({"ln_notation": True} | (settings or {}))
@@ -106,7 +120,11 @@ class Printer(LatexPrinter):
     def _print_Symbol(self, expr: sp.Symbol, style: str = "plain") -> str:
         printed = _WORD_BELOW.sub(r"_{\\mathrm{\1}", super()._print_Symbol(expr, style))
         several = len(printed) > 1 and printed.isascii() and printed.isalpha()
-        return rf"\mathit{{{printed}}}" if several and expr not in self._settings["symbol_names"] else printed
+        return (
+            rf"\mathit{{{printed}}}"
+            if several and expr not in self._settings["symbol_names"]
+            else printed
+        )
 
     def _print_Identity(self, expr: sp.Identity) -> str:
         return "I"
@@ -120,11 +138,17 @@ class _Ordered(Printer):
 def _ordered(terms: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Terms in the order people write them: lambda + K(y - S), not K(-S + y) + lambda.
 
-    Negative terms come last; a symbol that is no factor of another term comes first, and so does the number of 1 + x^2.
+    Negative terms come last; a symbol that is no factor of another term comes first, and so does
+    the number of 1 + x^2.
     """
 
     def rank(term: sp.Expr) -> tuple[bool, bool]:
-        bases = {factor.as_base_exp()[0] for other in terms if other != term for factor in sp.Mul.make_args(other)}
+        bases = {
+            factor.as_base_exp()[0]
+            for other in terms
+            if other != term
+            for factor in sp.Mul.make_args(other)
+        }
         alone = (term.is_Symbol and term not in bases) or (term.is_Number and len(terms) == 2)
         return term.could_extract_minus_sign(), not alone
 
@@ -132,7 +156,8 @@ def _ordered(terms: Sequence[sp.Expr]) -> list[sp.Expr]:
 
 
 def symbols(latex: str) -> float:
-    """How wide a formula is, counted in symbols; of a fraction the wider part, of matrices the widest row."""
+    """How wide a formula is, counted in symbols; of a fraction the wider part, of matrices the
+    widest row."""
     start = latex.find(r"\frac{")
     if start >= 0:
         above, after = _braced(latex, start + len(r"\frac"))

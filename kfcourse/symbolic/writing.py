@@ -1,4 +1,5 @@
-"""Formulas and numbers as people write them: parameters before variables before noises, short terms before long ones.
+"""Formulas and numbers as people write them: parameters before variables before noises, short terms
+before long ones.
 
 SymPy orders by the alphabet and prints f w x^2 + g x; the course writes g x + f x^2 w.
 """
@@ -15,45 +16,65 @@ from sympy.codegen.cfunctions import expm1
 from kfcourse.symbolic.typesetting import WIDTH, Printer, joined, symbols
 
 
-def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> str:
+def formula_latex(
+    expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()
+) -> str:
     """LaTeX of a formula.
 
     Parameters
     ----------
     expression : sympy expression
     variables : sequence of symbols
-        What the formula is a function of, in the order in which factors are written; all other symbols are parameters.
+        What the formula is a function of, in the order in which factors are written; all other
+        symbols are parameters.
     noises : sequence of symbols
         Variables that are written last in a product, and whose terms are written last in a sum.
     """
     printer = Printer({"order": "none", "fold_func_brackets": True})
-    return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))))
+    return str(
+        printer.doprint(
+            _Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))
+        )
+    )
 
 
-def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], before: str = "") -> list[str]:
-    """The same in as many lines as a page is wide beside what stands before them; only sums are broken."""
+def formula_lines(
+    expression: sp.Expr, variables: Sequence[sp.Symbol], before: str = ""
+) -> list[str]:
+    """The same in as many lines as a page is wide beside what stands before them; only sums are
+    broken."""
     expression = _readable(expression)
     whole = formula_latex(expression, variables)
     width = WIDTH - symbols(before)
     if symbols(whole) <= width or not isinstance(expression, sp.Add):
         return [whole]
-    return joined([formula_latex(term, variables) for term in _Writer(variables, ()).terms(expression)], width)
+    return joined(
+        [formula_latex(term, variables) for term in _Writer(variables, ()).terms(expression)], width
+    )
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:
-    """Without expm1, which keeps the digits of e^u - 1 in the code: people write the latter; and sin^2 u + cos^2 u is 1."""
+    """Without expm1, which keeps the digits of e^u - 1 in the code: people write the latter; and
+    sin^2 u + cos^2 u is 1."""
     if expression.has(expm1):
         expression = sp.expand(expression.replace(expm1, lambda u: sp.exp(u) - 1))
     if not (expression.has(sp.sin) and expression.has(sp.cos)):
         return expression
-    ways = (expression, _by_other(expression, sp.sin, sp.cos), _by_other(expression, sp.cos, sp.sin))
+    ways = (
+        expression,
+        _by_other(expression, sp.sin, sp.cos),
+        _by_other(expression, sp.cos, sp.sin),
+    )
     return min(ways, key=lambda way: len(sp.Add.make_args(way)))
 
 
 def _by_other(expression: sp.Expr, one: type[sp.Function], other: type[sp.Function]) -> sp.Expr:
     """With 1 - other^2 for the square of one of both functions."""
     return sp.expand(
-        expression.replace(lambda e: e.is_Pow and e.exp == 2 and e.base.func is one, lambda e: 1 - other(*e.base.args) ** 2)
+        expression.replace(
+            lambda e: e.is_Pow and e.exp == 2 and e.base.func is one,
+            lambda e: 1 - other(*e.base.args) ** 2,
+        )
     )
 
 
@@ -61,7 +82,8 @@ _LONG = re.compile(r"(?<![\w.,])\d{5,}(?!\w)")
 
 
 def by_thousands(text: str, comma: str = ",") -> str:
-    """The text with commas in whole numbers, and before the point of others, of five digits and more: 9999, 10,000."""
+    """The text with commas in whole numbers, and before the point of others, of five digits and
+    more: 9999, 10,000."""
     return _LONG.sub(lambda number: f"{int(number[0]):,}".replace(",", comma), text)
 
 
@@ -75,7 +97,8 @@ def number_latex(value: float) -> str:
 
 
 class _Writer:
-    """Rebuilds an expression with its sums and products in a given order, which the printer keeps."""
+    """Rebuilds an expression with its sums and products in a given order, which the printer
+    keeps."""
 
     def __init__(self, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol]) -> None:
         self.rank = {symbol: place for place, symbol in enumerate(variables)}
@@ -85,7 +108,9 @@ class _Writer:
         if isinstance(expression, sp.Add):
             return sp.Add(*map(self.arranged, self.terms(expression)), evaluate=False)
         if isinstance(expression, sp.Mul):
-            return sp.Mul(*map(self.arranged, sorted(expression.args, key=self.factor_key)), evaluate=False)
+            return sp.Mul(
+                *map(self.arranged, sorted(expression.args, key=self.factor_key)), evaluate=False
+            )
         if isinstance(expression, sp.Pow) and not expression.base.is_Atom:
             return sp.Pow(self.arranged(expression.base), expression.exp, evaluate=False)
         if isinstance(expression, sp.Function):
@@ -99,18 +124,32 @@ class _Writer:
         return last, not factor.is_number, max(ranks, default=-1), str(factor)
 
     def terms(self, total: sp.Add) -> list[sp.Expr]:
-        """Terms with the same parameters together: first the group with the shortest, earliest term; in it powers fall."""
+        """Terms with the same parameters together: first the group with the shortest, earliest
+        term; in it powers fall."""
         ordered = []
         for parameters, group in groupby(sorted(total.args, key=self.kind), self.kind):
-            members = sorted(group, key=lambda term: [-self.degree(term, symbol) for symbol in self.rank])
-            first = min((term.could_extract_minus_sign(), self.length(term), self.place(term)) for term in members)
+            members = sorted(
+                group, key=lambda term: [-self.degree(term, symbol) for symbol in self.rank]
+            )
+            first = min(
+                (term.could_extract_minus_sign(), self.length(term), self.place(term))
+                for term in members
+            )
             ordered.append((parameters[0], first, parameters[1], members))
-        return [term for *_, members in sorted(ordered, key=lambda item: item[:3]) for term in members]
+        return [
+            term for *_, members in sorted(ordered, key=lambda item: item[:3]) for term in members
+        ]
 
     def kind(self, term: sp.Expr) -> tuple[int, str]:
         """How many noises are in a term, and its parameters."""
         return self.noisiness(term), str(
-            sp.Mul(*[factor for factor in sp.Mul.make_args(term) if not self.varies(factor) and not factor.is_number])
+            sp.Mul(
+                *[
+                    factor
+                    for factor in sp.Mul.make_args(term)
+                    if not self.varies(factor) and not factor.is_number
+                ]
+            )
         )
 
     def varies(self, factor: sp.Expr) -> bool:
@@ -121,14 +160,29 @@ class _Writer:
 
     def length(self, term: sp.Expr) -> float:
         """Degree of the term in its variables; a function of them counts as one."""
-        return float(sum(self.power(factor) for factor in sp.Mul.make_args(term) if self.varies(factor)))
+        return float(
+            sum(self.power(factor) for factor in sp.Mul.make_args(term) if self.varies(factor))
+        )
 
     def place(self, term: sp.Expr) -> int:
-        return min((self.rank[symbol] for symbol in term.free_symbols if symbol in self.rank), default=len(self.rank))
+        return min(
+            (self.rank[symbol] for symbol in term.free_symbols if symbol in self.rank),
+            default=len(self.rank),
+        )
 
     def degree(self, term: sp.Expr, symbol: sp.Symbol) -> float:
-        return float(sum(self.power(factor) for factor in sp.Mul.make_args(term) if symbol in factor.free_symbols))
+        return float(
+            sum(
+                self.power(factor)
+                for factor in sp.Mul.make_args(term)
+                if symbol in factor.free_symbols
+            )
+        )
 
     def power(self, factor: sp.Expr) -> float:
         exponent = factor.as_base_exp()[1]
-        return float(exponent) if exponent.is_number and exponent.is_real and not isinstance(factor, sp.exp) else 1.0
+        return (
+            float(exponent)
+            if exponent.is_number and exponent.is_real and not isinstance(factor, sp.exp)
+            else 1.0
+        )

@@ -1,4 +1,5 @@
-"""Derivations as answers: which line and which term are named, what right steps are worth, what is refused in words."""
+"""Derivations as answers: which line and which term are named, what right steps are worth, what is
+refused in words."""
 
 from functools import cache
 
@@ -11,9 +12,15 @@ from kfcourse.lab.variants import load_variants
 
 BEGIN = "F = M[(y - h)^2]"
 END = "g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)"
-NOISE = {"state": "c*x + v", "meter": "x + x**2*w", "parameters": {"c": 0.5}, "meter_noise": {"variance": 2}}
+NOISE = {
+    "state": "c*x + v",
+    "meter": "x + x**2*w",
+    "parameters": {"c": 0.5},
+    "meter_noise": {"variance": 2},
+}
 TIMED = {"state": "c*x + v + 0.1*k", "meter": "x + x**2*w", "parameters": {"c": 0.5}}
-ODD = {"state": "c*x + v", "meter": "x*(1 + w)**2", "parameters": {"c": 0.5}}  # its noise is squared: M[w^4]
+# its noise is squared: M[w^4]
+ODD = {"state": "c*x + v", "meter": "x*(1 + w)**2", "parameters": {"c": 0.5}}
 
 
 @cache
@@ -44,7 +51,12 @@ def test_where_derivations_are_not_checked_the_course_s_model_is_asked_for(table
 def test_line_term_and_rule_are_named_and_what_stands_on_top_is_right():
     result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2", "d*(g^2 + 3*f^2*d)")
     assert (result.status, result.diagnosis, result.share) == ("wrong", ("moment",), 0.75)
-    named = ("line 3, `g^2*d + 3*f^2*d^2`", "`3*f^2*d^2` is not right", "Moments of a normal law", "right on top of it (1 step)")
+    named = (
+        "line 3, `g^2*d + 3*f^2*d^2`",
+        "`3*f^2*d^2` is not right",
+        "Moments of a normal law",
+        "right on top of it (1 step)",
+    )
     assert all(words in result.message for words in named)
     assert "3 of 4 steps are right" in result.message and "\n" not in result.message
 
@@ -57,15 +69,24 @@ def test_a_second_slip_is_named_too_and_costs_another_step():
 
 def test_the_hint_does_not_hold_the_right_line():
     result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2")
-    assert not any(part in result.message.replace(" ", "") for part in ("6*m^2*d", "m^4", "6*d*m^2"))
+    assert not any(
+        part in result.message.replace(" ", "") for part in ("6*m^2*d", "m^4", "6*d*m^2")
+    )
 
 
 def test_an_end_that_is_not_what_was_asked_for_does_not_pass(monkeypatch):
-    """Whatever the lines may have made the checker believe: here it reads them as another variant's."""
-    formulas = {"state": "c*x + v", "meter": "g*x + 2*f*x**2*w", "parameters": {"c": 1, "g": 1, "f": 1}}
+    """Whatever the lines may have made the checker believe: here it reads them as another
+    variant's."""
+    formulas = {
+        "state": "c*x + v",
+        "meter": "g*x + 2*f*x**2*w",
+        "parameters": {"c": 1, "g": 1, "f": 1},
+    }
     other = exercise("a", {"name": "mine", **formulas})
     setting = of_model(other.model)
-    monkeypatch.setattr(derived, "check_text", lambda text, find, _: check_text(text, find, setting))
+    monkeypatch.setattr(
+        derived, "check_text", lambda text, find, _: check_text(text, find, setting)
+    )
     result = told(BEGIN, "g^2*d + 4*f^2*M[x^4]", "g^2*d + 4*f^2*(m^4 + 6*m^2*d + 3*d^2)")
     assert (result.status, result.diagnosis, result.share) == ("wrong", ("other-meaning",), 0.0)
 
@@ -79,7 +100,8 @@ def test_the_same_again_gets_the_advice():
 
 
 def test_a_step_can_be_split_up_at_will_and_earns_no_more():
-    """Rewriting one line again and again does not hide that the next is wrong, nor that there is no end."""
+    """Rewriting one line again and again does not hide that the next is wrong, nor that there is no
+    end."""
     padding = [f"M[(y - h)^2] + {k} - {k}" for k in range(9)]
     assert told(BEGIN, *padding, "g^2*d").share == 0.8
     assert told(BEGIN, *padding).share == 0.4
@@ -93,11 +115,19 @@ def test_a_step_can_be_split_up_at_will_and_earns_no_more():
     ("kind", "words", "lines"),
     [
         ("open-end", "a mean is still to be taken", [BEGIN, "M[y^2] - h^2"]),
-        ("open-end", "still has h in it", [BEGIN, "M[y^2] - h^2", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2) - h^2"]),
+        (
+            "open-end",
+            "still has h in it",
+            [BEGIN, "M[y^2] - h^2", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2) - h^2"],
+        ),
         ("open-end", "still has F in it", [BEGIN, "F"]),
         ("steps-missing", "begin with a mean", [f"F = {END}", f"{END} + 0", f"0 + {END}"]),
         ("steps-missing", "3 different lines", [BEGIN, END, END]),
-        ("unreadable", "cannot be read at column", [BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2*"]),
+        (
+            "unreadable",
+            "cannot be read at column",
+            [BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2*"],
+        ),
     ],
 )
 def test_a_right_end_is_not_all(kind, words, lines):
@@ -108,11 +138,17 @@ def test_a_right_end_is_not_all(kind, words, lines):
 
 def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
     assert told("h = M[y]", "g*M[x]", f"g*m\n{BEGIN}", "g^2*d + f^2*M[x^4]", END).passed
-    assert told(f"letters q\nq = M[x^4]\n = m^4 + 6*m^2*d + 3*d^2\n{BEGIN}", "g^2*d + f^2*q", END).passed
+    assert told(
+        f"letters q\nq = M[x^4]\n = m^4 + 6*m^2*d + 3*d^2\n{BEGIN}", "g^2*d + f^2*q", END
+    ).passed
     wrong = told(f"h = 0\n{BEGIN}", "M[y^2]", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2)")
-    assert wrong.status == "wrong" and wrong.message.startswith("line 1, `0`: the line differs from what h means")
+    assert wrong.status == "wrong" and wrong.message.startswith(
+        "line 1, `0`: the line differs from what h means"
+    )
     for name in ("x", "w", "m", "g"):
-        assert f"`{name} =`, which has a meaning already" in told(f"{name} = 1\n{BEGIN}", END).message
+        assert (
+            f"`{name} =`, which has a meaning already" in told(f"{name} = 1\n{BEGIN}", END).message
+        )
 
 
 HOSTILE = {

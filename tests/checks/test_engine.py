@@ -1,4 +1,5 @@
-"""The engine: right answers pass in any form, wrong ones are told apart, and a known mistake is named."""
+"""The engine: right answers pass in any form, wrong ones are told apart, and a known mistake is
+named."""
 
 import math
 
@@ -15,17 +16,24 @@ pytestmark = pytest.mark.quick
 
 def test_a_right_answer_passes_in_any_form():
     assert outcome(SUM, lambda a, b: a + b + b).passed
-    assert outcome(SUM, lambda a, b: [float(u + 2 * v) for u, v in zip(a, b, strict=True)]).passed  # a list of numbers
+    # a list of numbers
+    assert outcome(SUM, lambda a, b: [float(u + 2 * v) for u, v in zip(a, b, strict=True)]).passed
     assert outcome(SUM, lambda a, b: (a + 2 * b).astype(object)).passed
     assert outcome(FORMULA, lambda a, b: (a + 1) ** 2 - 2 * a - 1 + sp.sin(b)).passed
-    assert outcome(FORMULA, lambda a, b: a**2 + sp.sqrt(1 - sp.cos(b) ** 2) * sp.sign(sp.sin(b))).passed
+    assert outcome(
+        FORMULA, lambda a, b: a**2 + sp.sqrt(1 - sp.cos(b) ** 2) * sp.sign(sp.sin(b))
+    ).passed
     assert outcome(FORMULA, lambda a, b: sp.Matrix([a**2 + sp.sin(b)])).passed  # one by one
-    assert outcome(FORMULA, lambda a, b: sp.Derivative(a**3 / 3, a) + sp.Integral(sp.cos(b), b)).passed
+    assert outcome(
+        FORMULA, lambda a, b: sp.Derivative(a**3 / 3, a) + sp.Integral(sp.cos(b), b)
+    ).passed
 
 
 def test_a_wrong_answer_does_not_pass_by_little():
     assert outcome(SUM, lambda a, b: a + 2 * b + 1e-7).status == "wrong"
-    assert outcome(FORMULA, lambda a, b: a**2 + sp.sin(b) + sp.Rational(1, 10**25)).status == "wrong"
+    assert (
+        outcome(FORMULA, lambda a, b: a**2 + sp.sin(b) + sp.Rational(1, 10**25)).status == "wrong"
+    )
 
 
 @pytest.mark.parametrize(
@@ -47,16 +55,23 @@ def test_parameters_have_the_sign_of_their_values():
     exercise = about({c: sp.Rational(-1, 2)})
     assert check(question, exercise, lambda a: -sp.Abs(c) * a).passed
     assert check(question, exercise, lambda a: sp.Abs(c) * a).status == "wrong"
-    assert check(question, exercise, lambda a: sp.symbols("c") * a).passed  # a symbol of the student's own, by its name
+    # a symbol of the student's own, by its name
+    assert check(question, exercise, lambda a: sp.symbols("c") * a).passed
 
 
 def test_variances_may_stand_under_roots():
     question = asks(lambda a, b: sp.sqrt(a * b), [(p, d)])
-    assert outcome(question, lambda a, b: sp.sqrt(a) * sp.sqrt(b)).passed  # not equal where both are negative
+    # not equal where both are negative
+    assert outcome(question, lambda a, b: sp.sqrt(a) * sp.sqrt(b)).passed
 
 
 def test_a_known_mistake_is_named_and_its_message_shown():
-    mistakes = catalogue((("once", "b enters twice", lambda a, b: a + b), ("minus", "the sign of b", lambda a, b: a - 2 * b)))
+    mistakes = catalogue(
+        (
+            ("once", "b enters twice", lambda a, b: a + b),
+            ("minus", "the sign of b", lambda a, b: a - 2 * b),
+        )
+    )
     question = asks(SUM.key, SUM.arguments(None), mistakes)
     result = outcome(question, lambda a, b: b + a)
     assert (result.status, result.diagnosis) == ("wrong", ("once",))
@@ -117,7 +132,14 @@ def test_result_shows_itself_and_carries_its_data():
     assert repr(result) == "✓ t1 a test: right"
     data = result._repr_mimebundle_()
     assert data["text/plain"] == repr(result)
-    told = {"question": "t1", "status": "passed", "diagnosis": [], "message": "right", "share": 1.0, "follows": []}
+    told = {
+        "question": "t1",
+        "status": "passed",
+        "diagnosis": [],
+        "message": "right",
+        "share": 1.0,
+        "follows": [],
+    }
     assert data[MIME] == told
     assert repr(outcome(SUM, lambda a, b: a)).startswith("✗ t1")
 
@@ -137,7 +159,8 @@ def test_arguments_are_the_students_own_copies():
 
 def test_not_implemented_is_the_students_own_word():
     assert outcome(SUM, raises(NotImplementedError())).status == "not implemented"
-    assert outcome(SUM, lambda *_: raises(NotImplementedError())()).status == "not implemented"  # of a helper of theirs
+    # of a helper of theirs
+    assert outcome(SUM, lambda *_: raises(NotImplementedError())()).status == "not implemented"
     result = outcome(FORMULA, lambda a, b: sp.Matrix(np.zeros((2, 2, 2))))  # raised by SymPy
     assert (result.status, "NotImplementedError" in result.message) == ("unusable", True)
 
@@ -149,6 +172,7 @@ def test_numbers_in_the_place_of_parameters_are_told():
         result = check(question, exercise, answer)
         assert (result.status, result.diagnosis) == ("wrong", ("numbers",)), result
     assert check(question, exercise, lambda a: (c * a, (a * c + c**3) / c)).passed
-    assert check(question, exercise, lambda a: (c * a, a - c / 2)).diagnosis != ("numbers",)  # right by chance
+    # right by chance
+    assert check(question, exercise, lambda a: (c * a, a - c / 2)).diagnosis != ("numbers",)
     of_argument = asks(lambda a: 2 * a, [(c,)])  # an argument with the name of a parameter is none
     assert check(of_argument, exercise, lambda a: -1).diagnosis != ("numbers",)

@@ -51,7 +51,11 @@ FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "
         (FORMULAS, "unused", lambda z, p: (c * z, c**2 + e**2)),
         (FORMULAS, "unused", lambda z, p: (c * z, p + e**2)),
         (FORMULAS, "superfluous", lambda z, p: (c * z, c**2 * p + e**2 * z)),
-        (asks(lambda z: sp.Matrix([[z, 1], [0, z]]), [(z,)]), "entry", lambda z: sp.Matrix([[z, 1], [0, 2 * z]])),
+        (
+            asks(lambda z: sp.Matrix([[z, 1], [0, z]]), [(z,)]),
+            "entry",
+            lambda z: sp.Matrix([[z, 1], [0, 2 * z]]),
+        ),
     ],
 )
 def test_hints(question, name, answer):
@@ -80,9 +84,13 @@ def test_other_forms_are_right():
     assert outcome(number, np.matrix).passed
     assert outcome(number, lambda a: np.array([[a]])).status == "unusable"
     assert outcome(number, complex).passed
-    assert outcome(asks(lambda a: np.array([0.0, 1.0]), [(1.0,)]), lambda a: np.array([False, True])).passed
+    assert outcome(
+        asks(lambda a: np.array([0.0, 1.0]), [(1.0,)]), lambda a: np.array([False, True])
+    ).passed
     assert like(np.matrix([[1.0]]), z) == 1
-    assert outcome(asks(lambda a: np.array([0.0, a]), [(2.0,)]), lambda a: np.matrix([0.0, a])).passed
+    assert outcome(
+        asks(lambda a: np.array([0.0, a]), [(2.0,)]), lambda a: np.matrix([0.0, a])
+    ).passed
     with pytest.raises(Unusable, match="shape"):
         like(np.matrix([1.0, 2.0]), np.zeros((2, 1)))
 
@@ -109,7 +117,10 @@ def test_negative_variances_are_no_news_where_the_right_answer_has_them():
 
 def test_what_is_not_finite_does_not_reach_lapack(capfd):
     """It complains on the terminal, past Python."""
-    fitted = asks(lambda a: np.linalg.lstsq(np.log([[3 - a, 2], [2, 1]]), [1, 2])[0], [(np.float64(0.5),), (np.float64(2.0),)])
+    fitted = asks(
+        lambda a: np.linalg.lstsq(np.log([[3 - a, 2], [2, 1]]), [1, 2])[0],
+        [(np.float64(0.5),), (np.float64(2.0),)],
+    )
     wrong = outcome(fitted, lambda a: np.array([1.0, 2.0]))
     assert wrong.diagnosis == ("unused",)
     assert capfd.readouterr() == ("", "")

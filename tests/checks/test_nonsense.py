@@ -1,4 +1,5 @@
-"""Nothing that a student hands in stops a check, and what comes of nonsense is a sentence that helps."""
+"""Nothing that a student hands in stops a check, and what comes of nonsense is a sentence that
+helps."""
 
 import math
 
@@ -54,7 +55,14 @@ def ruins_its_arguments(*arguments):
     return arguments[0]
 
 
-NOT_FUNCTIONS = {"None": None, "number": 3, "text": "z", "array": np.ones(3), "formula": z, "object": Evil()}
+NOT_FUNCTIONS = {
+    "None": None,
+    "number": 3,
+    "text": "z",
+    "array": np.ones(3),
+    "formula": z,
+    "object": Evil(),
+}
 RETURNED = {
     "text": "z",
     "nothing": None,
@@ -120,12 +128,15 @@ def filtered(y, mean, measure, predict):
     return np.array([predict(mean + 0.5 * (one - measure(mean))) for one in y])
 
 
-# A question of each kind, with a known mistake: formulas, matrices of formulas, an array with two hidden inputs, several arrays.
+# A question of each kind, with a known mistake: formulas, matrices of formulas, an array with two
+# hidden inputs, several arrays.
 KINDS = {
     "formulas": asks(
         lambda z, p: (sp.sin(z), z**2 * p + 1),
         [(z, p)],
-        catalogue([("noise-forgotten", "the noise is missing", lambda z, p: (sp.sin(z), z**2 * p))]),
+        catalogue(
+            [("noise-forgotten", "the noise is missing", lambda z, p: (sp.sin(z), z**2 * p))]
+        ),
         ("tau", "Theta"),
     ),
     "matrices": asks(
@@ -138,13 +149,27 @@ KINDS = {
         filtered,
         [(values, np.ones(2), lambda x: 2 * x, lambda x: x + 1) for values in (RUN, RUN[::-1])],
         catalogue(
-            [("not-predicted", "not predicted", lambda y, mean, measure, predict: filtered(y, mean, measure, lambda x: x))]
+            [
+                (
+                    "not-predicted",
+                    "not predicted",
+                    lambda y, mean, measure, predict: filtered(y, mean, measure, lambda x: x),
+                )
+            ]
         ),
     ),
     "arrays": asks(
         lambda x, z: (((x - z) ** 2).mean(axis=1), (x - z).std(axis=1)),
         [(RNG.normal(size=(5, 8)), RNG.normal(size=(5, 8)))],
-        catalogue([("absolute", "absolute values", lambda x, z: (np.abs(x - z).mean(axis=1), (x - z).std(axis=1)))]),
+        catalogue(
+            [
+                (
+                    "absolute",
+                    "absolute values",
+                    lambda x, z: (np.abs(x - z).mean(axis=1), (x - z).std(axis=1)),
+                )
+            ]
+        ),
         ("value", "error"),
     ),
 }

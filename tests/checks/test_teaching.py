@@ -1,4 +1,5 @@
-"""What a wrong answer gets: its own case, a stronger hint when it comes again, what it follows from, its share of right parts."""
+"""What a wrong answer gets: its own case, a stronger hint when it comes again, what it follows
+from, its share of right parts."""
 
 from types import SimpleNamespace
 
@@ -27,7 +28,9 @@ def test_a_wrong_answer_that_no_hint_explains_gets_its_own_case():
 
 def test_the_case_of_a_formula_has_values_of_the_parameters():
     exercise = about({c: sp.Rational(-1, 2)})
-    message = check(asks(lambda a: c + sp.exp(a), [(x,)]), exercise, lambda a: 3 * c - sp.exp(a)).message
+    message = check(
+        asks(lambda a: c + sp.exp(a), [(x,)]), exercise, lambda a: 3 * c - sp.exp(a)
+    ).message
     assert message.endswith("An example: at x = 1.3, c = -0.5 your function gives -5.169.")
 
 
@@ -42,7 +45,10 @@ def test_the_case_of_a_run_is_the_first_that_is_wrong():
         return found
 
     message = outcome(question, wrong).message
-    assert "step 1, trajectory 1 (counted from 0): for y = [[2, 3], [6, 7]], m = 1 your function gives [77, 8]." in message
+    assert (
+        "step 1, trajectory 1 (counted from 0): for y = [[2, 3], [6, 7]], m = 1 your function "
+        "gives [77, 8]." in message
+    )
 
 
 def test_the_same_wrong_answer_again_gets_a_stronger_hint():
@@ -55,7 +61,9 @@ def test_the_same_wrong_answer_again_gets_a_stronger_hint():
 
     assert told(lambda a, b: a - b) == "not right. the sign of b"
     assert told(lambda a, b: -b + a) == "not right. the sign of b Think of b."
-    assert told(lambda a, b: -b + a).startswith("not right. the sign of b Think of b. An example: for a = 2.5")
+    assert told(lambda a, b: -b + a).startswith(
+        "not right. the sign of b Think of b. An example: for a = 2.5"
+    )
     assert told(lambda a, b: 2 * (a + b)) == "not right. It is twice what it should be."
     assert told(lambda a, b: a - b) == "not right. the sign of b"
     assert told(lambda a, b: a + b) == "right"
@@ -78,7 +86,9 @@ def named(name, key):
     return Question(name, "", "core", key, lambda _: [(A,)])
 
 
-QUESTIONS = {one.name: one for one in (named("t1", single), named("t2", doubled), named("t3", three))}
+QUESTIONS = {
+    one.name: one for one in (named("t1", single), named("t2", doubled), named("t3", three))
+}
 EXERCISE = about(questions=QUESTIONS)
 
 
@@ -123,7 +133,8 @@ def test_a_check_that_fails_in_itself_costs_nothing_but_itself():
 
 
 def test_a_search_for_a_hint_that_fails_costs_the_hint():
-    question = asks(lambda a: a**2, [(2.0,)], [SimpleNamespace(answer=None)])  # a catalogue that is broken
+    # a catalogue that is broken
+    question = asks(lambda a: a**2, [(2.0,)], [SimpleNamespace(answer=None)])
     object.__setattr__(question, "mistakes", (None,))
     result = outcome(question, lambda a: a + 17.0)
     assert result.status == "wrong"
@@ -139,9 +150,18 @@ def test_results_of_other_shapes_in_another_order_are_compared():
 
 
 def test_a_covariance_is_symmetric_by_its_values():
-    J, P, s = sp.ImmutableMatrix([[1, x], [0, y]]), sp.ImmutableMatrix([[p, z], [z, d]]), sp.Symbol("s", real=True)
+    J, P, s = (
+        sp.ImmutableMatrix([[1, x], [0, y]]),
+        sp.ImmutableMatrix([[p, z], [z, d]]),
+        sp.Symbol("s", real=True),
+    )
     question = asks(lambda z: J * P * J.T, [(z,)])
-    message = outcome(question, lambda z: J * P * J.T + s**2 * sp.eye(2) + sp.Matrix([[0, (x + 1) ** 2], [x**2 + 2 * x + 1, 0]]))
+    message = outcome(
+        question,
+        lambda z: (
+            J * P * J.T + s**2 * sp.eye(2) + sp.Matrix([[0, (x + 1) ** 2], [x**2 + 2 * x + 1, 0]])
+        ),
+    )
     assert "symmetric" not in message.message
 
 
@@ -154,5 +174,8 @@ def test_an_example_of_a_step_shows_the_rows_beside_it() -> None:
     """An interval is the difference of two rows: from one alone nobody sees what is wrong."""
     times, wrong = np.array([5.0, 7.0, 8.0]), np.array([2.0, 1.0, 7.0])
     said = shown(["times"], [times], wrong, np.array([2.0, 1.0, 1.0]), axes=("step",))
-    assert said == "An example, step 2 (counted from 0): for times[1:3] = [7, 8] your function gives 7."
+    assert (
+        said
+        == "An example, step 2 (counted from 0): for times[1:3] = [7, 8] your function gives 7."
+    )
     assert "times[0:2] = [5, 7]" in shown(["times"], [times], wrong + 1, wrong, axes=("step",))

@@ -16,13 +16,16 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("answer", [endless, stubborn, very_stubborn], ids=lambda answer: answer.__name__)
+@pytest.mark.parametrize(
+    "answer", [endless, stubborn, very_stubborn], ids=lambda answer: answer.__name__
+)
 def test_endless_loops_end(answer):
     start = time.monotonic()
     result = outcome(SUM, answer, seconds=0.2)
     assert result.status == "unusable"
     assert "still running after 0.2 s" in result.message
-    # The last one is stopped only where the alarm finds it outside of its try, by one alarm of some tens, 100 a second.
+    # The last one is stopped only where the alarm finds it outside of its try, by one alarm of some
+    # tens, 100 a second.
     assert time.monotonic() - start < 30
 
 
@@ -74,7 +77,8 @@ def test_blocks_in_blocks_keep_their_own_limits():
                 endless()
             return "went on"
 
-    assert any(outer_ends(seconds) >= 2 for seconds in (0.3, 3, 30))  # on a busy machine the later ones
+    # on a busy machine the later ones
+    assert any(outer_ends(seconds) >= 2 for seconds in (0.3, 3, 30))
     assert inner_ends() == "went on"
 
 

@@ -1,4 +1,5 @@
-"""Tiny questions of the tests' own, for the machinery that knows no exercise set; answers that stop or never do."""
+"""Tiny questions of the tests' own, for the machinery that knows no exercise set; answers that stop
+or never do."""
 
 from types import SimpleNamespace
 
@@ -14,17 +15,24 @@ c, e, g, f = sp.symbols("c e g f", real=True)
 
 def about(values=(), **more):
     """An exercise about a model of these values."""
-    return SimpleNamespace(model=SimpleNamespace(values=dict(values)), places=(), posed={}, **{"questions": {}} | more)
+    return SimpleNamespace(
+        model=SimpleNamespace(values=dict(values)), places=(), posed={}, **{"questions": {}} | more
+    )
 
 
 NOTHING = about()
 
 
 def asks(right, arguments, mistakes=(), parts=(), **options):
-    return Question("t1", "a test", "core", right, lambda _: arguments, tuple(mistakes), parts, **options)
+    return Question(
+        "t1", "a test", "core", right, lambda _: arguments, tuple(mistakes), parts, **options
+    )
 
 
-SUM = asks(lambda a, b: a + 2 * b, [(np.array([1.0, 2.5]), np.array([-0.3, 4.0])), (np.array([0.7, -1.0]), np.array([3.0, 0.2]))])
+SUM = asks(
+    lambda a, b: a + 2 * b,
+    [(np.array([1.0, 2.5]), np.array([-0.3, 4.0])), (np.array([0.7, -1.0]), np.array([3.0, 0.2]))],
+)
 FORMULA = asks(lambda a, b: a**2 + sp.sin(b), [(x, y)])
 
 

@@ -1,4 +1,5 @@
-"""Measurements at instants: Kalman's filter by matrix exponentials, slow Euler loops, closed forms, published figures."""
+"""Measurements at instants: Kalman's filter by matrix exponentials, slow Euler loops, closed forms,
+published figures."""
 
 import dataclasses
 from pathlib import Path
@@ -9,7 +10,18 @@ import scipy.linalg
 import sympy as sp
 from click.testing import CliRunner
 
-from kfcourse import Model, compare, gauss_hermite, gaussian, likelihood, linearised, predictions, run, smooth, unscented
+from kfcourse import (
+    Model,
+    compare,
+    gauss_hermite,
+    gaussian,
+    likelihood,
+    linearised,
+    predictions,
+    run,
+    smooth,
+    unscented,
+)
 from kfcourse.cli import main
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
@@ -19,7 +31,14 @@ from kfcourse.lab.variants import VariantError, summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.records import estimate, read_measurements
-from kfcourse.scenarios.benchmarks import DOUBLE_WELL, EXACT_MUL, benes, double_well, exact_mul, jimenez_data
+from kfcourse.scenarios.benchmarks import (
+    DOUBLE_WELL,
+    EXACT_MUL,
+    benes,
+    double_well,
+    exact_mul,
+    jimenez_data,
+)
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
@@ -36,7 +55,8 @@ FORCE = [0.3, -1.0, 0.7, 2.0, 0.1, 0.0]
 
 
 def oscillator(extra="", **changes):
-    """Two states, correlated noises and meters, a force that is known: nothing unit, nothing diagonal."""
+    """Two states, correlated noises and meters, a force that is known: nothing unit, nothing
+    diagonal."""
     return sampled(
         [f"-0.2*x1 + x2{extra}", "-2*x1 - 0.7*x2 + u + 0.1"],
         [["0.5", "0.2"], ["-0.3", "0.8"]],
@@ -49,7 +69,8 @@ def oscillator(extra="", **changes):
 
 
 def transitions():
-    """exp(A dt), what the force adds, and the noise's covariance, the last two by Simpson's rule over ten thousand intervals."""
+    """exp(A dt), what the force adds, and the noise's covariance, the last two by Simpson's rule
+    over ten thousand intervals."""
     spans = [*np.diff(INSTANTS), 4.3 - 4.0]
     for span, u in zip(spans, FORCE, strict=True):
         s = np.linspace(0, span, 10_001)
@@ -57,7 +78,9 @@ def transitions():
         rule[[0, -1]] = 1
         rule *= span / 30_000
         values, vectors = np.linalg.eig(A)
-        powers = np.einsum("ij,sj,jk->sik", vectors, np.exp(s[:, None] * values), np.linalg.inv(vectors)).real
+        powers = np.einsum(
+            "ij,sj,jk->sik", vectors, np.exp(s[:, None] * values), np.linalg.inv(vectors)
+        ).real
         shift = np.einsum("s,sij,j", rule, powers, np.array([0, u + 0.1]))
         Q = np.einsum("s,sij,jk,slk->il", rule, powers, B @ B.T, powers)
         yield scipy.linalg.expm(A * span), shift, Q
@@ -105,7 +128,8 @@ def test_a_linear_model_has_kalmans_filter(structure):
 @pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
 def test_integrated_the_linear_model_is_the_same_but_for_the_accuracy(structure):
     y = record()
-    # (1 + t - t)-like changes would be simplified away; so small a cubic is none, but the equations are integrated
+    # (1 + t - t)-like changes would be simplified away; so small a cubic is none, but the equations
+    # are integrated
     for accuracy in (1e-5, 1e-9):
         chosen = aof(structure(oscillator(" - 1e-14*x1**3", accuracy=accuracy)))
         error = run(chosen, y).mean - run(aof(linearised(oscillator())), y).mean
@@ -148,7 +172,8 @@ def test_very_stiff_linear_models_are_exact():
     np.testing.assert_allclose(Theta, np.full((2, 2), left**2 + (1 - left**2) / 2), rtol=3e-6)
 
 
-# ---------------------------------------------------------------- nonlinear: van der Pol, as the school's C2, from the page
+# ---------------------------------------------------------------- nonlinear: van der Pol, as the
+# school's C2, from the page
 
 L, W, ALPHA, BETA = 3.0, 0.1 * np.pi, 1.0, 0.25
 
@@ -157,17 +182,23 @@ def van_der_pol(**options):
     drift = ["x2", "-w0**2*x1 + al*x2*(1 - be*x1**2)"]
     values = {"w0": W, "al": ALPHA, "be": BETA}
     prior = {"mean": [2, -1], "variance": 0.15}
-    return sampled(drift, [["0"], ["x1"]], ["x1 + w1", "x2 + w2"], values, interval=0.4, prior=prior, **options)
+    return sampled(
+        drift, [["0"], ["x1"]], ["x1 + w1", "x2 + w2"], values, interval=0.4, prior=prior, **options
+    )
 
 
 def of_page(exact):
-    """tau-dot, A and Theta-dot of C2 at z, p: `exact` means over the normal law, or those at its mean."""
+    """tau-dot, A and Theta-dot of C2 at z, p: `exact` means over the normal law, or those at its
+    mean."""
 
     def rates(z, p):
         z1, z2 = z
         p11, p12 = (p[0, 0], p[0, 1]) if exact else (0.0, 0.0)
         drift = -(W**2) * z1 + ALPHA * z2 - ALPHA * BETA * (z1**2 * z2 + z2 * p11 + 2 * z1 * p12)
-        slopes = [[0, 1], [-(W**2) - 2 * ALPHA * BETA * (z1 * z2 + p12), ALPHA - ALPHA * BETA * (z1**2 + p11)]]
+        slopes = [
+            [0, 1],
+            [-(W**2) - 2 * ALPHA * BETA * (z1 * z2 + p12), ALPHA - ALPHA * BETA * (z1**2 + p11)],
+        ]
         return np.array([z2, drift]), np.array(slopes), np.diag([0, z1**2 + p11])
 
     return rates
@@ -181,15 +212,19 @@ def by_euler(rates, z, p, span, steps):
     return z, p
 
 
-@pytest.mark.parametrize(("structure", "exact"), [(linearised, False), (gaussian, True), (gauss_hermite, True)])
+@pytest.mark.parametrize(
+    ("structure", "exact"), [(linearised, False), (gaussian, True), (gauss_hermite, True)]
+)
 def test_the_moment_equations_against_a_slow_loop(structure, exact):
     z, p = np.array([1.5, -0.8]), np.array([[0.3, 0.1], [0.1, 0.5]])
     tau, Theta = structure(van_der_pol()).at(0).predict(z[None], p[None])
     coarse, fine = (by_euler(of_page(exact), z, p, 0.4, steps) for steps in (4000, 8000))
     for got, less, more in zip((tau[0], Theta[0]), coarse, fine, strict=True):
-        # Euler's error is halved, so twice the fine less the coarse has that of the next order, (1e-4)^2
+        # Euler's error is halved, so twice the fine less the coarse has that of the next order,
+        # (1e-4)^2
         np.testing.assert_allclose(got, 2 * more - less, rtol=0, atol=1e-6)
-        assert np.abs(more - less).max() > 1e-6  # it is that extrapolation which meets us, not either
+        # it is that extrapolation which meets us, not either
+        assert np.abs(more - less).max() > 1e-6
 
 
 def test_the_derived_equations_are_the_page_s():
@@ -197,13 +232,20 @@ def test_the_derived_equations_are_the_page_s():
     for structure, exact in ((linearised, False), (gaussian, True)):
         equations = moment_equations(model, structure)
         values = np.array([1.5, -0.8, 0.3, 0.1, 0.5])
-        at = dict(zip((*equations.z, *[equations.p[i] for i in (0, 1, 3)]), values, strict=True)) | model.values
+        at = (
+            dict(zip((*equations.z, *[equations.p[i] for i in (0, 1, 3)]), values, strict=True))
+            | model.values
+        )
         z, p = values[:2], np.array([[0.3, 0.1], [0.1, 0.5]])
         drift, slopes, intensity = of_page(exact)(z, p)
         for formula, value in zip(equations[2:], (drift[:, None], slopes, intensity), strict=True):
             np.testing.assert_allclose(np.array(formula.subs(at), dtype=float), value, atol=1e-12)
         mean, spread = equations.rates
-        np.testing.assert_allclose(np.array(spread.subs(at), dtype=float), slopes @ p + p @ slopes.T + intensity, atol=1e-12)
+        np.testing.assert_allclose(
+            np.array(spread.subs(at), dtype=float),
+            slopes @ p + p @ slopes.T + intensity,
+            atol=1e-12,
+        )
         assert mean == equations.drift
 
 
@@ -224,7 +266,9 @@ def test_means_and_second_moments_of_the_exact_multiplicative_object():
     """M x' = m exp(a (t^2 - s^2) / 2), M x'^2 = (M x^2) exp((2 a + b^2) (t^2 - s^2) / 2)."""
     a, b = -0.3, 0.4
     structure = gaussian(exact_mul(a, b, accuracy=1e-10)).at(2)
-    (tau,), ((Theta,),) = (part[0] for part in structure.predict(np.array([[0.8]]), np.array([[[0.05]]])))
+    (tau,), ((Theta,),) = (
+        part[0] for part in structure.predict(np.array([[0.8]]), np.array([[[0.05]]]))
+    )
     t, s = 3.5, 2.5
     mean = 0.8 * np.exp(a * (t**2 - s**2) / 2)
     second = (0.05 + 0.8**2) * np.exp((2 * a + b**2) * (t**2 - s**2) / 2)
@@ -241,7 +285,9 @@ def published(model, y, structure=gaussian):
 
 def test_the_log_likelihood_of_the_exact_multiplicative_object():
     a, b, printed = EXACT_MUL
-    assert published(exact_mul(a, b), jimenez_data("exact-mul")[1]) == pytest.approx(printed, abs=5e-4)
+    assert published(exact_mul(a, b), jimenez_data("exact-mul")[1]) == pytest.approx(
+        printed, abs=5e-4
+    )
 
 
 def test_the_log_likelihood_of_the_double_well():
@@ -255,20 +301,26 @@ def test_the_log_likelihood_of_the_double_well():
 def test_the_estimates_of_the_exact_multiplicative_object():
     fitted = estimate(exact_mul(-0.1, 0.1), jimenez_data("exact-mul")[1], ["a", "b"], ["b"])
     a, b, _ = EXACT_MUL
-    assert fitted.value == pytest.approx([a, b], abs=2e-3)  # his sum leaves the first measurement out
+    # his sum leaves the first measurement out
+    assert fitted.value == pytest.approx([a, b], abs=2e-3)
 
 
 # ---------------------------------------------------------------- Benes
 
 
 def bayes_on_a_grid(y, interval, r):
-    """Means, variances and log densities by the object's own transition density, e^(-t/2) cosh(x') / cosh(x) N(x'; x, t)."""
+    """Means, variances and log densities by the object's own transition density, e^(-t/2) cosh(x')
+    / cosh(x) N(x'; x, t)."""
     x = np.linspace(-14, 14, 3001)
     h = x[1] - x[0]
     log_cosh = np.logaddexp(x, -x) - np.log(2)
-    kernel = np.exp(-0.5 * (x[:, None] - x) ** 2 / interval - interval / 2 + log_cosh[:, None] - log_cosh)
+    kernel = np.exp(
+        -0.5 * (x[:, None] - x) ** 2 / interval - interval / 2 + log_cosh[:, None] - log_cosh
+    )
     kernel *= h / np.sqrt(2 * np.pi * interval)
-    start = np.exp(-0.5 * (x - 0.1) ** 2 / interval - interval / 2 + log_cosh - np.log(np.cosh(0.1)))
+    start = np.exp(
+        -0.5 * (x - 0.1) ** 2 / interval - interval / 2 + log_cosh - np.log(np.cosh(0.1))
+    )
     density = start / np.sqrt(2 * np.pi * interval)  # at the second instant; x(0) = 0.1
     rows = []
     for value in y[1:]:
@@ -303,7 +355,8 @@ def test_no_filter_beats_benes_and_the_quadrature_filter_comes_near():
     # its own covariance is the actual one
     own = run(benes_filter(model), simulate(model, 4000, 12, 2).y).cov[..., 0, 0].mean(axis=1)
     actual = compared.error_variance("benes")
-    assert (np.abs(own - actual.value)[1:] < 6 * actual.standard_error[1:]).all()  # own has an error, too
+    # own has an error, too
+    assert (np.abs(own - actual.value)[1:] < 6 * actual.standard_error[1:]).all()
 
 
 def test_benes_filter_refuses_other_objects():
@@ -322,7 +375,8 @@ def test_benes_filter_refuses_other_objects():
 
 
 def strong_errors(model, exact, substeps):
-    """Mean absolute errors at the end of an interval, on common Wiener paths; and their standard errors."""
+    """Mean absolute errors at the end of an interval, on common Wiener paths; and their standard
+    errors."""
     rng = np.random.default_rng(5)
     finest, runs = max(substeps), 4000
     fine = rng.standard_normal((runs, finest))
@@ -340,7 +394,9 @@ def test_the_strong_order_of_the_simulation():
     counts = [4, 16, 64, 256]
     geometric = sampled("0.5*x", "0.8*x", "x + w")
     mean, error = strong_errors(
-        geometric, lambda fine: np.exp(0.5 - 0.32 + 0.8 * fine.sum(axis=1) / np.sqrt(256))[:, None], counts
+        geometric,
+        lambda fine: np.exp(0.5 - 0.32 + 0.8 * fine.sum(axis=1) / np.sqrt(256))[:, None],
+        counts,
     )
     orders = np.log(mean[:-1] / mean[1:]) / np.log(4)
     assert np.abs(orders - 0.5).max() < 0.1 and (4 * error / mean < 0.1 * np.log(4)).all()
@@ -351,19 +407,23 @@ def test_the_strong_order_of_the_simulation():
     errors = []
     for count in counts[:3]:
         noise = path.reshape(4000, count, -1).sum(axis=-1) / np.sqrt(4096 // count)
-        got = dataclasses.replace(additive.between, substeps=count).motion(additive)(np.full((4000, 1), 1.0), noise, 0)
+        got = dataclasses.replace(additive.between, substeps=count).motion(additive)(
+            np.full((4000, 1), 1.0), noise, 0
+        )
         errors.append(np.abs(got - wanted).mean())
     orders = np.log(np.array(errors[:-1]) / errors[1:]) / np.log(4)
     assert np.abs(orders - 1).max() < 0.15
 
 
 def test_the_weak_order_where_the_noise_is_added():
-    """A linear object: the variance of its scheme follows from its formula, and errs by the square of the step."""
+    """A linear object: the variance of its scheme follows from its formula, and errs by the square
+    of the step."""
     errors = []
     for count in (4, 8, 16):
         model = sampled("-x", "1", "x + w", substeps=count)
         moves = model.between.motion(model)
-        unit = [moves(np.zeros((1, 1)), row[None], 0).item() for row in np.eye(count)]  # linear in each noise
+        # linear in each noise
+        unit = [moves(np.zeros((1, 1)), row[None], 0).item() for row in np.eye(count)]
         errors.append(abs(np.square(unit).sum() - (1 - np.exp(-2)) / 2))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.25)
 
@@ -377,16 +437,22 @@ def test_an_ensemble_has_the_moments_that_are_integrated():
             break
         mean, cov = Phi @ mean + shift, Phi @ cov @ Phi.T + Q
         error = np.sqrt(np.diag(cov) / 20_000)
-        assert (np.abs(x[k + 1].mean(axis=0) - mean) < 4.5 * error + 1e-3).all()  # and (1/32)^2 of weak error
+        # and (1/32)^2 of weak error
+        assert (np.abs(x[k + 1].mean(axis=0) - mean) < 4.5 * error + 1e-3).all()
         sample = np.cov(x[k + 1].T)
-        assert (np.abs(sample - cov) < 4.5 * np.sqrt(2 / 20_000) * np.sqrt(np.outer(np.diag(cov), np.diag(cov))) + 2e-3).all()
+        assert (
+            np.abs(sample - cov)
+            < 4.5 * np.sqrt(2 / 20_000) * np.sqrt(np.outer(np.diag(cov), np.diag(cov))) + 2e-3
+        ).all()
 
 
 # ---------------------------------------------------------------- what works as everywhere
 
 
 def test_stratonovich_adds_half_of_b_db():
-    model = sampled("-a*x", "s*x", "x + w", {"a": 0.5, "s": 0.8}, stratonovich=True, interval=2, accuracy=1e-9)
+    model = sampled(
+        "-a*x", "s*x", "x + w", {"a": 0.5, "s": 0.8}, stratonovich=True, interval=2, accuracy=1e-9
+    )
     s, x = sp.Symbol("s", real=True), model.x[0]
     assert model.between.correction[0].subs(model.values) == sp.Rational(8, 25) * x
     tau, Theta = gaussian(model).at(0).predict(np.array([[1.5]]), np.array([[[0.2]]]))
@@ -397,7 +463,9 @@ def test_stratonovich_adds_half_of_b_db():
     two = sampled(["0", "0"], [["x2", "1"], ["x1*x2", "x2"]], ["x1 + w"], stratonovich=True)
     x1, x2 = two.x
     # by hand: 1/2 sum_j (dB_j/dx) B_j with B_1 = (x2, x1 x2), B_2 = (1, x2)
-    assert sp.expand(two.between.correction - sp.Matrix([x1 * x2, x2**2 + x1**2 * x2 + x2]) / 2) == sp.zeros(2, 1)
+    assert sp.expand(
+        two.between.correction - sp.Matrix([x1 * x2, x2**2 + x1**2 * x2 + x2]) / 2
+    ) == sp.zeros(2, 1)
     assert s not in two.between.correction.free_symbols
 
 
@@ -407,19 +475,30 @@ def test_fos_and_duof_tend_to_kalmans_filter():
     compared = compare(filters, model, 4000, 8, seed=3, design_runs=20_000)
     for name in compared.names[1:]:
         relative = compared.relative(name, "aof-linearised")
-        assert np.abs(relative.value - 1).max() < 0.01  # coefficients of 20,000 trajectories, and (1/64)^2 of weak error
+        # coefficients of 20,000 trajectories, and (1/64)^2 of weak error
+        assert np.abs(relative.value - 1).max() < 0.01
 
 
 def test_particles_agree_with_the_normal_filter_where_it_is_exact():
     model = sampled("-0.5*x", "0.9", "x + 0.5*w", interval=0.8, substeps=16)
     y = simulate(model, 2, 6, 4).y
     ours, exact = run(particle(model, 4000), y), run(aof(gaussian(model)), y)
-    assert np.abs(ours.mean - exact.mean).max() < 6 * np.sqrt(exact.cov.max() / 1000)  # a quarter of them count
+    # a quarter of them count
+    assert np.abs(ours.mean - exact.mean).max() < 6 * np.sqrt(exact.cov.max() / 1000)
 
 
 def test_parameters_are_estimated_as_everywhere():
-    """Of Ornstein and Uhlenbeck's process seen without error the maximum is that of a regression, in closed form."""
-    truth = sampled("-a*x", "s", "x + 0*w", {"a": 0.8, "s": 1.1}, interval=0.5, prior={"variance": 0}, substeps=32)
+    """Of Ornstein and Uhlenbeck's process seen without error the maximum is that of a regression,
+    in closed form."""
+    truth = sampled(
+        "-a*x",
+        "s",
+        "x + 0*w",
+        {"a": 0.8, "s": 1.1},
+        interval=0.5,
+        prior={"variance": 0},
+        substeps=32,
+    )
     y = simulate(truth, 1, 400, 7).y
     x = y[:, 0, 0]
     slope = (x[1:] @ x[:-1]) / (x[:-1] @ x[:-1])
@@ -432,7 +511,10 @@ def test_parameters_are_estimated_as_everywhere():
 
 def test_a_record_brings_its_instants(tmp_path):
     path = tmp_path / "record.csv"
-    rows = [f"{t},{'' if np.isnan(y) else y}" for t, y in zip([0.0, 0.3, 1.1, 1.2], [0.1, np.nan, -0.5, 0.7], strict=True)]
+    rows = [
+        f"{t},{'' if np.isnan(y) else y}"
+        for t, y in zip([0.0, 0.3, 1.1, 1.2], [0.1, np.nan, -0.5, 0.7], strict=True)
+    ]
     path.write_text("time,y\n" + "\n".join(rows) + "\n", encoding="utf-8")
     settings = {"parameters": {"a": 0.5}, "meter_noise": {"variance": 0.2}}
     given = read_measurements(path, sampled("-a*x", "1", "x + w", **settings))
@@ -444,7 +526,14 @@ def test_a_record_brings_its_instants(tmp_path):
 
 
 def test_angles_stay_on_the_circle():
-    model = sampled("2", "0.1", "x + w", interval=1, angles={"x": ["x"], "y": ["y"]}, prior={"mean": 3, "variance": 0.01})
+    model = sampled(
+        "2",
+        "0.1",
+        "x + w",
+        interval=1,
+        angles={"x": ["x"], "y": ["y"]},
+        prior={"mean": 3, "variance": 0.01},
+    )
     tau, _ = linearised(model).at(0).predict(np.array([[3.0]]), np.array([[[0.01]]]))
     assert tau.item() == pytest.approx(5 - 2 * np.pi)
 
@@ -496,7 +585,9 @@ def test_other_mistakes():
 
 def test_a_drift_that_explodes_is_named():
     model = sampled("0.01*x**3 - 0.5*x", "1.5", "x + w", prior={"mean": 8}, interval=5)
-    with pytest.raises(NotFinite, match=r"infinite [\d.]+ after an instant, and the next is 5 after it"):
+    with pytest.raises(
+        NotFinite, match=r"infinite [\d.]+ after an instant, and the next is 5 after it"
+    ):
         run(aof(gaussian(model)), np.full(3, np.nan))
 
 
@@ -519,9 +610,12 @@ parameters = {{ a1 = -0.5, a3 = -0.01 }}
 steps = 11
 """
     texts = [
-        table.format(name, more) for name, more in (("CD1", 'diffusion = "1.5"'), ("none", ""), ("row", 'diffusion = ["1"]'))
+        table.format(name, more)
+        for name, more in (("CD1", 'diffusion = "1.5"'), ("none", ""), ("row", 'diffusion = ["1"]'))
     ]
-    path.write_text("\n".join([*texts, table.format("state", 'diffusion = "1"\nstate = "x"')]), encoding="utf-8")
+    path.write_text(
+        "\n".join([*texts, table.format("state", 'diffusion = "1"\nstate = "x"')]), encoding="utf-8"
+    )
     chosen = find_variant("CD1", path)
     assert chosen.steps == 11 and chosen.model.between.diffusion[0] == sp.Rational(3, 2)
     z, p = 0.7, 0.4
@@ -531,17 +625,28 @@ steps = 11
     wanted = [-0.5 * z - 0.01 * (z**3 + 3 * z * p), -0.5 - 0.03 * (z**2 + p), 2.25]
     assert [float(part[0].subs(at)) for part in equations[2:]] == pytest.approx(wanted, abs=1e-12)
     h, G, F, _ = gaussian(chosen.model).at(0).measure(np.array([[z]]), np.array([[[p]]]))
-    assert [h.item(), G.item(), F.item()] == pytest.approx([z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + 1])
+    assert [h.item(), G.item(), F.item()] == pytest.approx(
+        [z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + 1]
+    )
     assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", chosen.table)
-    for name, words in (("none", "no diffusion"), ("row", "list of rows"), ("state", "unknown key state")):
+    for name, words in (
+        ("none", "no diffusion"),
+        ("row", "list of rows"),
+        ("state", "unknown key state"),
+    ):
         with pytest.raises(VariantError, match=words):
             find_variant(name, path)
 
 
 def test_the_command_ranks_the_filters_of_such_a_variant(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("my.toml").write_text('[variants.mine]\ndrift = "-a*x"\ndiffusion = "1"\nmeter = "x + w"\nparameters = { a = 0.5 }\n')
+    Path("my.toml").write_text(
+        '[variants.mine]\ndrift = "-a*x"\ndiffusion = "1"\nmeter = "x + w"\nparameters = { a = '
+        "0.5 }\n"
+    )
     chosen = ["--filters", "aof-linearised,duof", "--runs", "300", "--steps", "3"]
-    done = CliRunner().invoke(main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"])
+    done = CliRunner().invoke(
+        main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"]
+    )
     assert done.exit_code == 0 and "LAOF" in done.stdout and "No report" in done.stderr
     assert Path("numbers.json").exists() and not Path("lab-mine").exists()

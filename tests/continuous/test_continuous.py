@@ -1,4 +1,5 @@
-"""Continuous time: simulation against closed forms, the filter against slow loops, exact discretisation, python-control."""
+"""Continuous time: simulation against closed forms, the filter against slow loops, exact
+discretisation, python-control."""
 
 import math
 from itertools import pairwise
@@ -40,12 +41,17 @@ S_VECTOR = [[0.8, 0.2], [0.2, 0.5]]
 def ornstein_uhlenbeck(**changes):
     """dx/dt = -a x + s xi, y = h x + n; stationary variance s^2 S_xi / (4 a)."""
     a, s, S = 0.7, 1.3, 0.9
-    settings = {"prior": {"variance": s**2 * S / (4 * a)}, "spectral_density": S, "noise_density": 0.4} | changes
+    settings = {
+        "prior": {"variance": s**2 * S / (4 * a)},
+        "spectral_density": S,
+        "noise_density": 0.4,
+    } | changes
     return ContinuousModel.define("-a*x", "s", "h*x", {"a": a, "s": s, "h": 1.5}, **settings)
 
 
 def oscillator():
-    """A damped oscillator, both components seen through a mixing meter with correlated noises: linear, nothing unit."""
+    """A damped oscillator, both components seen through a mixing meter with correlated noises:
+    linear, nothing unit."""
     return ContinuousModel.define(
         ["x2", "-k*x1 - c*x2 + 0.1"],
         [["0.2", "0"], ["0.1", "s"]],
@@ -71,19 +77,29 @@ def nonlinear_vector():
 
 
 def parabola(**changes):
-    settings = {"prior": {"mean": 0.4, "variance": 0.3}, "spectral_density": 1.6, "noise_density": 0.5} | changes
+    settings = {
+        "prior": {"mean": 0.4, "variance": 0.3},
+        "spectral_density": 1.6,
+        "noise_density": 0.5,
+    } | changes
     return ContinuousModel.define(
-        "-a*x + b*x**2", "s*(1 + x/4)", "x + k*x**2/2", {"a": 1.1, "b": 0.1, "s": 0.8, "k": 0.7}, **settings
+        "-a*x + b*x**2",
+        "s*(1 + x/4)",
+        "x + k*x**2/2",
+        {"a": 1.1, "b": 0.1, "s": 0.8, "k": 0.7},
+        **settings,
     )
 
 
-# --- simulation -------------------------------------------------------------------------------------------------------------
+# --- simulation
+# -------------------------------------------------------------------------------------------------------------
 
 
 def test_simulated_moments_are_those_of_the_ornstein_uhlenbeck_process():
     """Variance, covariance at a distance, and the variance of y_k, within 4 standard errors.
 
-    Step 1/400: the scheme's own variance is larger by the factor 1 / (1 - a dt / 2), 1e-3, a tenth of a standard error.
+    Step 1/400: the scheme's own variance is larger by the factor 1 / (1 - a dt / 2), 1e-3, a tenth
+    of a standard error.
     """
     runs, T, substeps, a, q, h = 20_000, 0.5, 200, 0.7, 1.3**2 * 0.9 / 2, 1.5
     path = simulate(ornstein_uhlenbeck(), T, 3, runs, 5, substeps)
@@ -99,31 +115,45 @@ def test_simulated_moments_are_those_of_the_ornstein_uhlenbeck_process():
     assert abs(np.mean(path.y[1] ** 2) - expected) < 4 * expected * math.sqrt(2 / runs)
     # noises of successive measurements are independent: only the state correlates them
     cross = h**2 * variance * ((1 - decay) / (a * T)) ** 2
-    assert abs(np.mean(path.y[0] * path.y[1]) - cross) < 4 * math.sqrt((expected**2 + cross**2) / runs)
+    assert abs(np.mean(path.y[0] * path.y[1]) - cross) < 4 * math.sqrt(
+        (expected**2 + cross**2) / runs
+    )
 
 
 def test_multiplicative_noise_is_taken_in_itos_sense():
-    """dx/dt = a x + s x xi: the mean is x0 e^{at} in Ito's sense, x0 e^{(a + s^2 S_xi / 4) t} in the symmetrised one."""
+    """dx/dt = a x + s x xi: the mean is x0 e^{at} in Ito's sense, x0 e^{(a + s^2 S_xi / 4) t} in
+    the symmetrised one."""
     a, s, S, runs, T = -0.3, 0.6, 1.4, 40_000, 1.0
-    model = ContinuousModel.define("a*x", "s*x", "x", {"a": a, "s": s}, prior={"mean": 2, "variance": 0.0}, spectral_density=S)
+    model = ContinuousModel.define(
+        "a*x", "s*x", "x", {"a": a, "s": s}, prior={"mean": 2, "variance": 0.0}, spectral_density=S
+    )
     x = simulate(model, T, 1, runs, 8, substeps=100).x[1, :, 0]
     error = x.std() / math.sqrt(runs)
-    # Euler's own mean is 2 (1 + a T / 100)^100, 2 e^{aT} but for 5e-4 of it: a sixth of a standard error
+    # Euler's own mean is 2 (1 + a T / 100)^100, 2 e^{aT} but for 5e-4 of it: a sixth of a standard
+    # error
     assert abs(x.mean() - 2 * math.exp(a * T)) < 4 * error
     assert abs(x.mean() - 2 * math.exp((a + s**2 * S / 4) * T)) > 20 * error
     x_, xi = sp.symbols("x xi", real=True)
-    extra = symmetrised_drift(sp.Matrix([a * x_ + s * x_ * xi]), [x_], [xi], sp.Matrix([[sp.Float(S) / 2]]))
+    extra = symmetrised_drift(
+        sp.Matrix([a * x_ + s * x_ * xi]), [x_], [xi], sp.Matrix([[sp.Float(S) / 2]])
+    )
     assert abs(float(extra[0].subs(x_, 1.7)) - s**2 * 1.7 * S / 4) < 1e-14
 
 
 def test_correlated_noises_have_their_covariances():
-    """One short step from a known state: increments of x and values of y are normal with known covariances."""
+    """One short step from a known state: increments of x and values of y are normal with known
+    covariances."""
     runs, T = 50_000, 0.01
     model = nonlinear_vector()
     still = ContinuousModel.define(
-        list(model.drift), model.diffusion, list(model.signal), {"a": 0.8},
-        prior={"mean": [0.6, -0.5], "variance": 0.0}, spectral_density=S_VECTOR, noise_density=N_VECTOR,
-    )  # fmt: skip
+        list(model.drift),
+        model.diffusion,
+        list(model.signal),
+        {"a": 0.8},
+        prior={"mean": [0.6, -0.5], "variance": 0.0},
+        spectral_density=S_VECTOR,
+        noise_density=N_VECTOR,
+    )
     path = simulate(still, T, 1, runs, 3)
     g = np.array([[0.3, 0.06], [-0.1, 0.5]])
     for sample, cov in (
@@ -136,7 +166,8 @@ def test_correlated_noises_have_their_covariances():
 
 
 def test_a_coarse_path_is_the_same_path():
-    """substeps draw the same numbers as a fine path, and coarsening it gives the same: equal but for the order of a sum."""
+    """substeps draw the same numbers as a fine path, and coarsening it gives the same: equal but
+    for the order of a sum."""
     model = nonlinear_vector()
     fine = simulate(model, 0.01, 24, 5, 4)
     coarse = simulate(model, 0.06, 4, 5, 4, substeps=6)
@@ -146,7 +177,9 @@ def test_a_coarse_path_is_the_same_path():
     assert np.allclose(seen.y, coarse.y, rtol=1e-12, atol=1e-12)
     for k in range(4):  # straight from the definition
         assert np.array_equal(seen.x[k], fine.x[6 * k])
-        assert np.allclose(seen.y[k], sum(fine.y[6 * k + i] for i in range(6)) / 6, rtol=0, atol=1e-13)
+        assert np.allclose(
+            seen.y[k], sum(fine.y[6 * k + i] for i in range(6)) / 6, rtol=0, atol=1e-13
+        )
     twice = coarsen(coarsen(fine, 2), 3)
     assert np.array_equal(twice.x, seen.x) and np.allclose(twice.y, seen.y, rtol=0, atol=1e-13)
 
@@ -157,7 +190,8 @@ def test_an_explosion_is_reported():
         simulate(model, 0.1, 100, 4, 1)
 
 
-# --- the discrete model -----------------------------------------------------------------------------------------------------
+# --- the discrete model
+# -----------------------------------------------------------------------------------------------------
 
 
 def test_the_discrete_model_is_eulers():
@@ -166,7 +200,12 @@ def test_the_discrete_model_is_eulers():
     (x,), (v,), (w,) = discrete.x, discrete.v, discrete.w
     a, b, s, k = sp.symbols("a b s k", real=True)
     step = sp.Rational(1, 20)
-    assert sp.expand(discrete.state_equation[0] - (x + step * (-a * x + b * x**2 + s * (1 + x / 4) * v))) == 0
+    assert (
+        sp.expand(
+            discrete.state_equation[0] - (x + step * (-a * x + b * x**2 + s * (1 + x / 4) * v))
+        )
+        == 0
+    )
     assert sp.expand(discrete.meter_equation[0] - (x + k * x**2 / 2 + w)) == 0
     assert discrete.state_noise.cov.item() == pytest.approx(1.6 / (2 * T))
     assert discrete.meter_noise.cov.item() == pytest.approx(0.5 / (2 * T))
@@ -174,11 +213,17 @@ def test_the_discrete_model_is_eulers():
 
 
 def test_the_discrete_limit_of_the_covariance_equation():
-    """(Theta of the linearised discrete model after its correction - D) / T tends to the Riccati rate, the error falls as T."""
+    """(Theta of the linearised discrete model after its correction - D) / T tends to the Riccati
+    rate, the error falls as T."""
     model = oscillator()
     A, G, H = linear_matrices(model)
     D = np.array([[0.5, -0.1], [-0.1, 0.7]])
-    rate = A @ D + D @ A.T + G @ np.array(S_VECTOR) @ G.T / 2 - D @ H.T @ np.linalg.inv(np.array(N_VECTOR) / 2) @ H @ D
+    rate = (
+        A @ D
+        + D @ A.T
+        + G @ np.array(S_VECTOR) @ G.T / 2
+        - D @ H.T @ np.linalg.inv(np.array(N_VECTOR) / 2) @ H @ D
+    )
     errors = []
     for T in (2e-3, 1e-3):
         structure = linearised(to_discrete(model, T))
@@ -186,17 +231,20 @@ def test_the_discrete_limit_of_the_covariance_equation():
         corrected = D - D @ m.G.T @ np.linalg.inv(m.F) @ m.G @ D
         errors.append(np.abs((structure.predict(np.zeros(2), corrected).cov - D) / T - rate).max())
     assert errors[0] < 0.1 * np.abs(rate).max()
-    assert 1.9 < errors[0] / errors[1] < 2.1  # c T + d T^2: the ratio is 2 but for a term of order T
+    # c T + d T^2: the ratio is 2 but for a term of order T
+    assert 1.9 < errors[0] / errors[1] < 2.1
 
 
-# --- formulas ---------------------------------------------------------------------------------------------------------------
+# --- formulas
+# ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("make", [parabola, nonlinear_vector, oscillator])
 def test_derivatives_against_finite_differences(make):
     """u and U are the derivatives of F, computed here in plain NumPy from the formulas' values.
 
-    Central differences with the step e = 1e-4: their error is e^2 F''' ~ 1e-7 and 1e-16 F / e^2 ~ 1e-7; 1e-5 is far above.
+    Central differences with the step e = 1e-4: their error is e^2 F''' ~ 1e-7 and 1e-16 F / e^2 ~
+    1e-7; 1e-5 is far above.
     """
     model = make()
     e = filter_equations(model)
@@ -225,7 +273,9 @@ def test_derivatives_against_finite_differences(make):
 def test_linear_signal_leaves_the_riccati_term():
     model = oscillator()
     full, usual = filter_equations(model), filter_equations(model, second_derivatives=False)
-    N = sp.Matrix([[sp.Rational(3, 10), sp.Rational(1, 10)], [sp.Rational(1, 10), sp.Rational(1, 5)]])
+    N = sp.Matrix(
+        [[sp.Rational(3, 10), sp.Rational(1, 10)], [sp.Rational(1, 10), sp.Rational(1, 5)]]
+    )
     H = sp.Matrix([[1, sp.Rational(3, 10)], [0, sp.Rational(4, 5)]])
     assert (full.U + 2 * H.T * N.inv() * H).applyfunc(sp.simplify) == sp.zeros(2, 2)
     assert (full.U - usual.U).applyfunc(sp.simplify) == sp.zeros(2, 2)
@@ -239,22 +289,38 @@ def test_the_log_likelihood_rate_completes_the_square():
     assert sp.expand(log_likelihood_rate(S, y, N) - (y.T * N.inv() * y)[0] + square) == 0
 
 
-# --- the filter against slow loops ------------------------------------------------------------------------------------------
+# --- the filter against slow loops
+# ------------------------------------------------------------------------------------------
 
 SIGNALS = {  # S and its first three derivatives, by hand
-    "x + 0.7*x**2/2": (lambda x: x + 0.35 * x * x, lambda x: 1 + 0.7 * x, lambda x: 0.7, lambda x: 0.0),
-    "2*sin(x)": (
-        lambda x: 2 * math.sin(x), lambda x: 2 * math.cos(x), lambda x: -2 * math.sin(x), lambda x: -2 * math.cos(x),
+    "x + 0.7*x**2/2": (
+        lambda x: x + 0.35 * x * x,
+        lambda x: 1 + 0.7 * x,
+        lambda x: 0.7,
+        lambda x: 0.0,
     ),
-}  # fmt: skip
+    "2*sin(x)": (
+        lambda x: 2 * math.sin(x),
+        lambda x: 2 * math.cos(x),
+        lambda x: -2 * math.sin(x),
+        lambda x: -2 * math.cos(x),
+    ),
+}
 
 
 @pytest.mark.parametrize("signal", SIGNALS)
-@pytest.mark.parametrize(("second", "symmetrised"), [(False, False), (True, False), (True, True), (False, True)])
+@pytest.mark.parametrize(
+    ("second", "symmetrised"), [(False, False), (True, False), (True, True), (False, True)]
+)
 def test_the_scalar_filter_is_the_loop_in_plain_floats(signal, second, symmetrised):
     T, N, S_xi, steps, runs = 0.01, 0.5, 1.6, 60, 3
     model = ContinuousModel.define(
-        "-1.1*x + 0.1*x**2", "0.8 + 0.2*x", signal, prior={"mean": 0.4, "variance": 0.3}, spectral_density=S_xi, noise_density=N
+        "-1.1*x + 0.1*x**2",
+        "0.8 + 0.2*x",
+        signal,
+        prior={"mean": 0.4, "variance": 0.3},
+        spectral_density=S_xi,
+        noise_density=N,
     )
     y = simulate(model, T, steps, runs, 2).y
     found = predictions(extended_kalman_bucy(model, T, second, symmetrised), y)
@@ -262,7 +328,8 @@ def test_the_scalar_filter_is_the_loop_in_plain_floats(signal, second, symmetris
     for r in range(runs):
         z, D = 0.4, 0.3
         for k in range(steps):
-            assert math.isclose(found.mean[k, r, 0], z, rel_tol=1e-11, abs_tol=1e-12)  # rounding of 60 steps
+            # rounding of 60 steps
+            assert math.isclose(found.mean[k, r, 0], z, rel_tol=1e-11, abs_tol=1e-12)
             assert math.isclose(found.cov[k, r, 0, 0], D, rel_tol=1e-11)
             innovation = y[k, r, 0] - S(z)
             B = 1 / (1 / D + T * S1(z) ** 2 * 2 / N)
@@ -292,7 +359,10 @@ def test_the_vector_filter_is_the_page():
             assert np.allclose(found.mean[k, r], z, rtol=1e-10, atol=1e-11)  # rounding of 40 steps
             assert np.allclose(found.cov[k, r], D, rtol=1e-10, atol=1e-11)
             x1, x2 = z
-            f, A = np.array([math.sin(x2), -0.8 * x1 - x2**3 / 5]), np.array([[0, math.cos(x2)], [-0.8, -0.6 * x2**2]])
+            f, A = (
+                np.array([math.sin(x2), -0.8 * x1 - x2**3 / 5]),
+                np.array([[0, math.cos(x2)], [-0.8, -0.6 * x2**2]]),
+            )
             g = np.array([[0.3, 0.1 * x1], [0.2 * x2, 0.5]])
             S = np.array([x1 + 0.4 * x1 * x2, math.cos(x2) + 0.3 * x1**2])
             H = np.array([[1 + 0.4 * x2, 0.4 * x1], [0.6 * x1, -math.sin(x2)]])
@@ -308,22 +378,31 @@ def test_the_vector_filter_is_the_page():
 
 @pytest.mark.parametrize("symmetrised", [False, True])
 def test_the_white_term_has_the_mean_that_its_sense_demands(symmetrised):
-    """Over the white noise of y, (Mean[p'] - p) / T is the rate of dD/dt, plus in the symmetrised sense its correction.
+    """Over the white noise of y, (Mean[p'] - p) / T is the rate of dD/dt, plus in the symmetrised
+    sense its correction.
 
-    p' is the covariance after the correction; the mean over the two normal noises is Gauss-Hermite quadrature (9 x 9 points,
-    exact for polynomials of degree 17).  What is left is of the order T: halving T halves it.
+    p' is the covariance after the correction; the mean over the two normal noises is Gauss-Hermite
+    quadrature (9 x 9 points, exact for polynomials of degree 17).  What is left is of the order T:
+    halving T halves it.
     """
     model = nonlinear_vector()
     e = filter_equations(model)
-    at = dict(zip(e.z, model.prior.mean, strict=True)) | {e.D[i, j]: model.prior.cov[i, j] for i in range(2) for j in range(2)}
+    at = dict(zip(e.z, model.prior.mean, strict=True)) | {
+        e.D[i, j]: model.prior.cov[i, j] for i in range(2) for j in range(2)
+    }
     S = np.array(e.S.subs(at | model.values), dtype=float)[:, 0]
     at |= dict(zip(e.y, S, strict=True)) | model.values
     D, J = model.prior.cov, -np.array(e.U.subs(at), dtype=float)
     rate_cov, rate_mean = -D @ J @ D, np.zeros(2)
     if symmetrised:
         N = sp.Matrix(N_VECTOR)
-        extra = np.array(symmetrised_drift(e.rates, e.state, list(e.y), N / 2).subs(at), dtype=float)[:, 0]
-        rate_mean, rate_cov = extra[:2], rate_cov + np.array([[extra[2], extra[3]], [extra[3], extra[4]]])
+        extra = np.array(
+            symmetrised_drift(e.rates, e.state, list(e.y), N / 2).subs(at), dtype=float
+        )[:, 0]
+        rate_mean, rate_cov = (
+            extra[:2],
+            rate_cov + np.array([[extra[2], extra[3]], [extra[3], extra[4]]]),
+        )
     nodes, weights = np.polynomial.hermite_e.hermegauss(9)
     pairs = np.array([[a, b] for a in nodes for b in nodes])
     weight = np.array([a * b for a in weights for b in weights]) / weights.sum() ** 2
@@ -333,19 +412,25 @@ def test_the_white_term_has_the_mean_that_its_sense_demands(symmetrised):
         y = S + pairs @ np.linalg.cholesky(np.array(N_VECTOR) / (2 * T)).T
         posterior = one.step(one.init(len(y)), y).posterior
         left.append(np.abs((np.tensordot(weight, posterior.cov, 1) - D) / T - rate_cov).max())
-        assert np.abs((weight @ posterior.mean - model.prior.mean) / T - rate_mean).max() < 0.01 * max(1, np.abs(rate_mean).max())
+        assert np.abs(
+            (weight @ posterior.mean - model.prior.mean) / T - rate_mean
+        ).max() < 0.01 * max(1, np.abs(rate_mean).max())
     assert left[0] < 0.02 * np.abs(rate_cov).max()
     assert 1.7 < left[0] / left[1] < 2.3
 
 
-# --- linear models ----------------------------------------------------------------------------------------------------------
+# --- linear models
+# ----------------------------------------------------------------------------------------------------------
 
 
 def exact_filter(model, T, y):
-    """The Kalman filter of y_k = (1/T) Integral y dt, not approximated: van Loan's discretisation of (x, Integral H x dt)."""
+    """The Kalman filter of y_k = (1/T) Integral y dt, not approximated: van Loan's discretisation
+    of (x, Integral H x dt)."""
     A, G, H = linear_matrices(model)
     f0 = np.array(model.drift.subs(model.values).subs(dict.fromkeys(model.x, 0)), dtype=float)[:, 0]
-    S0 = np.array(model.signal.subs(model.values).subs(dict.fromkeys(model.x, 0)), dtype=float)[:, 0]
+    S0 = np.array(model.signal.subs(model.values).subs(dict.fromkeys(model.x, 0)), dtype=float)[
+        :, 0
+    ]
     n, p = model.n, model.p
     F = np.zeros((n + p + 1, n + p + 1))  # x, integral of the signal, the constant 1
     F[:n, :n], F[:n, -1], F[n : n + p, :n], F[n : n + p, -1] = A, f0, H, S0
@@ -372,10 +457,11 @@ def exact_filter(model, T, y):
 
 @pytest.mark.parametrize("make", [ornstein_uhlenbeck, oscillator])
 def test_the_filter_of_a_linear_model_tends_to_the_exact_one(make):
-    """The same trajectories seen with T = 1/25, 1/50, 1/100: covariances and estimates come nearer in proportion to T.
+    """The same trajectories seen with T = 1/25, 1/50, 1/100: covariances and estimates come nearer
+    in proportion to T.
 
-    Covariances have the error c T + d T^2, so the ratio is near 2; for the root mean square of the estimates over
-    200 runs the statistical error of the ratio is below 2 / sqrt(2 * 200) = 0.1.
+    Covariances have the error c T + d T^2, so the ratio is near 2; for the root mean square of the
+    estimates over 200 runs the statistical error of the ratio is below 2 / sqrt(2 * 200) = 0.1.
     """
     model = make()
     fine = simulate(model, 0.0025, 800, 200, 3)
@@ -393,7 +479,8 @@ def test_the_filter_of_a_linear_model_tends_to_the_exact_one(make):
 
 
 def test_the_scalar_riccati_equation_has_its_closed_form():
-    """dD/dt = -2 a D + q - c D^2: D(t) by the hyperbolic tangent; the scheme's error halves with the step."""
+    """dD/dt = -2 a D + q - c D^2: D(t) by the hyperbolic tangent; the scheme's error halves with
+    the step."""
     a, q, c, D0 = 0.7, 1.3**2 * 0.9 / 2, 1.5**2 * 2 / 0.4, 3.0
     model = ornstein_uhlenbeck(prior={"variance": D0})
     root = math.sqrt(a * a + c * q)
@@ -409,28 +496,52 @@ def test_the_scalar_riccati_equation_has_its_closed_form():
     assert errors[1] < 0.1
 
 
-# --- functions of time ------------------------------------------------------------------------------------------------------
+# --- functions of time
+# ------------------------------------------------------------------------------------------------------
 
 
 def varying(**changes):
-    """Linear, and everything depends on time: a decay that swings, a noise that dies down, a meter that fades in and out."""
-    settings = {"prior": {"mean": 1.5, "variance": 2.0}, "spectral_density": 0.9, "noise_density": 0.4} | changes
-    return ContinuousModel.define("-(a + sin(2*t))*x + cos(t)", "0.5 + exp(-t)", "(1 + 0.8*cos(3*t))*x", {"a": 0.7}, **settings)
+    """Linear, and everything depends on time: a decay that swings, a noise that dies down, a meter
+    that fades in and out."""
+    settings = {
+        "prior": {"mean": 1.5, "variance": 2.0},
+        "spectral_density": 0.9,
+        "noise_density": 0.4,
+    } | changes
+    return ContinuousModel.define(
+        "-(a + sin(2*t))*x + cos(t)",
+        "0.5 + exp(-t)",
+        "(1 + 0.8*cos(3*t))*x",
+        {"a": 0.7},
+        **settings,
+    )
 
 
 def varying_moments(times):
-    """Mean and variance of `varying` without measurements, and the error variance of its optimal filter: ODEs of the page."""
+    """Mean and variance of `varying` without measurements, and the error variance of its optimal
+    filter: ODEs of the page."""
 
     def rates(t, moments):
         mean, variance, D = moments
-        A, q, H = -(0.7 + math.sin(2 * t)), (0.5 + math.exp(-t)) ** 2 * 0.9 / 2, 1 + 0.8 * math.cos(3 * t)
-        return [A * mean + math.cos(t), 2 * A * variance + q, 2 * A * D + q - (H * D) ** 2 * 2 / 0.4]
+        A, q, H = (
+            -(0.7 + math.sin(2 * t)),
+            (0.5 + math.exp(-t)) ** 2 * 0.9 / 2,
+            1 + 0.8 * math.cos(3 * t),
+        )
+        return [
+            A * mean + math.cos(t),
+            2 * A * variance + q,
+            2 * A * D + q - (H * D) ** 2 * 2 / 0.4,
+        ]
 
-    return scipy.integrate.solve_ivp(rates, (0, times[-1]), [1.5, 2.0, 2.0], t_eval=times, rtol=1e-10, atol=1e-12).y
+    return scipy.integrate.solve_ivp(
+        rates, (0, times[-1]), [1.5, 2.0, 2.0], t_eval=times, rtol=1e-10, atol=1e-12
+    ).y
 
 
 def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
-    """The scheme's error halves with the step; D itself swings between 0.1 and 0.3 after its start from 2."""
+    """The scheme's error halves with the step; D itself swings between 0.1 and 0.3 after its start
+    from 2."""
     errors = []
     for T in (0.02, 0.01, 0.005):
         steps = round(4 / T)
@@ -443,8 +554,8 @@ def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
 
 
 def test_the_discrete_model_has_its_functions_at_the_times_of_its_steps():
-    """f, g, S at t_k = k T; its Kalman filter has the same covariances, and estimates that differ in proportion to T:
-    f is taken at the corrected estimate instead of the predicted one."""
+    """f, g, S at t_k = k T; its Kalman filter has the same covariances, and estimates that differ
+    in proportion to T: f is taken at the corrected estimate instead of the predicted one."""
     T, x, v, w = 0.25, np.array([[0.7]]), np.array([[-0.4]]), np.array([[1.1]])
     state, meter = compile_model(to_discrete(varying(), T))
     for k in (0, 3):
@@ -480,17 +591,25 @@ def test_steady_state_is_that_of_python_control(make):
     A, G, H = linear_matrices(model)
     L, P, _ = control.lqe(A, G, H, model.spectral_density / 2, model.noise_density / 2)
     found = steady_state(model)
-    assert np.allclose(found.cov, P, rtol=1e-10, atol=1e-12)  # two solvers of the same equation, well conditioned
+    # two solvers of the same equation, well conditioned
+    assert np.allclose(found.cov, P, rtol=1e-10, atol=1e-12)
     assert np.allclose(found.gain, L, rtol=1e-10, atol=1e-12)
-    residual = A @ found.cov + found.cov @ A.T + G @ model.spectral_density @ G.T / 2 - found.gain @ H @ found.cov
+    residual = (
+        A @ found.cov
+        + found.cov @ A.T
+        + G @ model.spectral_density @ G.T / 2
+        - found.gain @ H @ found.cov
+    )
     assert np.abs(residual).max() < 1e-12
 
 
-# --- as a filter among the others -------------------------------------------------------------------------------------------
+# --- as a filter among the others
+# -------------------------------------------------------------------------------------------
 
 
 def test_the_continuous_and_the_discrete_extended_filter_come_together():
-    """On the same data their difference is small beside the error itself, and falls with the step (by 2 or more for T / 4)."""
+    """On the same data their difference is small beside the error itself, and falls with the step
+    (by 2 or more for T / 4)."""
     model = parabola()
     fine = simulate(model, 0.0025, 400, 300, 5)
     differences = []
@@ -510,33 +629,57 @@ def test_a_missing_measurement_corrects_nothing():
         one = extended_kalman_bucy(model, 0.05, *how)
         y = np.array([[[0.8], [np.nan]]])
         both, alone = run(one, y), run(one, y[:, :1])
-        assert np.array_equal(both.mean[:, :1], alone.mean) and np.array_equal(both.cov[:, :1], alone.cov)
+        assert np.array_equal(both.mean[:, :1], alone.mean) and np.array_equal(
+            both.cov[:, :1], alone.cov
+        )
         z, D = model.prior.mean[0], model.prior.cov[0, 0]
         after = one.step(one.init(2), y[0])
-        assert after.posterior.mean[1, 0] == z and math.isclose(after.posterior.cov[1, 0, 0], D, rel_tol=1e-15)
+        assert after.posterior.mean[1, 0] == z and math.isclose(
+            after.posterior.cov[1, 0, 0], D, rel_tol=1e-15
+        )
         q = (0.8 * (1 + z / 4)) ** 2 * 1.6 / 2
-        assert math.isclose(after.predicted.mean[1, 0], z + 0.05 * (-1.1 * z + 0.1 * z**2), rel_tol=1e-14)
-        assert math.isclose(after.predicted.cov[1, 0, 0], (1 + 0.05 * (-1.1 + 0.2 * z)) ** 2 * D + 0.05 * q, rel_tol=1e-14)
+        assert math.isclose(
+            after.predicted.mean[1, 0], z + 0.05 * (-1.1 * z + 0.1 * z**2), rel_tol=1e-14
+        )
+        assert math.isclose(
+            after.predicted.cov[1, 0, 0],
+            (1 + 0.05 * (-1.1 + 0.2 * z)) ** 2 * D + 0.05 * q,
+            rel_tol=1e-14,
+        )
 
 
 def test_a_missing_component_is_a_smaller_meter():
-    """Independent noises: without its second component the meter is the one with the first alone."""
-    both = ContinuousModel.define(["x2", "-x1"], [["0"], ["1"]], ["x1", "x2"], noise_density=[0.3, 0.5])
+    """Independent noises: without its second component the meter is the one with the first
+    alone."""
+    both = ContinuousModel.define(
+        ["x2", "-x1"], [["0"], ["1"]], ["x1", "x2"], noise_density=[0.3, 0.5]
+    )
     first = ContinuousModel.define(["x2", "-x1"], [["0"], ["1"]], ["x1"], noise_density=0.3)
     y = simulate(both, 0.05, 10, 4, 1).y
     without = y.copy()
     without[..., 1] = np.nan
-    a, b = run(extended_kalman_bucy(both, 0.05), without), run(extended_kalman_bucy(first, 0.05), y[..., :1])
-    assert np.allclose(a.mean, b.mean, rtol=1e-12, atol=1e-13) and np.allclose(a.cov, b.cov, rtol=1e-12, atol=1e-13)
+    a, b = (
+        run(extended_kalman_bucy(both, 0.05), without),
+        run(extended_kalman_bucy(first, 0.05), y[..., :1]),
+    )
+    assert np.allclose(a.mean, b.mean, rtol=1e-12, atol=1e-13) and np.allclose(
+        a.cov, b.cov, rtol=1e-12, atol=1e-13
+    )
 
 
 def test_names_that_the_filter_uses_itself():
     """Parameters and states called z, D, y, v, w, xi change nothing."""
     plain = parabola()
     named = ContinuousModel.define(
-        "-z*D + y*D**2", "v*(1 + D/4)", "D + w*D**2/2", {"z": 1.1, "y": 0.1, "v": 0.8, "w": 0.7}, symbols=["D"],
-        prior={"mean": 0.4, "variance": 0.3}, spectral_density=1.6, noise_density=0.5,
-    )  # fmt: skip
+        "-z*D + y*D**2",
+        "v*(1 + D/4)",
+        "D + w*D**2/2",
+        {"z": 1.1, "y": 0.1, "v": 0.8, "w": 0.7},
+        symbols=["D"],
+        prior={"mean": 0.4, "variance": 0.3},
+        spectral_density=1.6,
+        noise_density=0.5,
+    )
     y = simulate(plain, 0.05, 10, 3, 2).y
     assert np.array_equal(simulate(named, 0.05, 10, 3, 2).y, y)
     a, b = (run(extended_kalman_bucy(model, 0.05, True, True), y) for model in (plain, named))
@@ -545,22 +688,28 @@ def test_names_that_the_filter_uses_itself():
 
 def test_a_lost_filter_is_named():
     """Where the log-likelihood curves upwards the symmetrised reading has no finite solution."""
-    model = ContinuousModel.define("-x", "1", "3*cos(x)", prior={"variance": 2}, spectral_density=4, noise_density=0.1)
+    model = ContinuousModel.define(
+        "-x", "1", "3*cos(x)", prior={"variance": 2}, spectral_density=4, noise_density=0.1
+    )
     y = simulate(model, 0.01, 200, 50, 1).y
     with pytest.raises(
-        NotFinite, match=r"step \d+, time .*kalman-bucy-second-symmetrised became .* of 50 runs; take a smaller step"
+        NotFinite,
+        match=r"step \d+, time .*kalman-bucy-second-symmetrised became .* of 50 runs; take a "
+        r"smaller step",
     ):
         run(extended_kalman_bucy(model, 0.01, True, True), y)
 
 
 def test_a_negative_covariance_is_an_error():
-    """At z = 0 of a sine the symmetrised sense adds -B^3 / N to dD/dt.  Here B = 4.8, T B^3 / N = 10.8."""
+    """At z = 0 of a sine the symmetrised sense adds -B^3 / N to dD/dt.  Here B = 4.8, T B^3 / N =
+    10.8."""
     model = ContinuousModel.define("-x", "1", "sin(x)", prior={"variance": 100}, noise_density=0.1)
     with pytest.raises(NotFinite, match=r"step 0, time 0.01: .* negative in 3 of 3 runs"):
         run(extended_kalman_bucy(model, 0.01, True, True), np.zeros((1, 3, 1)))
 
 
-# --- input ------------------------------------------------------------------------------------------------------------------
+# --- input
+# ------------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -636,7 +785,8 @@ def test_no_steady_state():
 
 @pytest.mark.parametrize("rate", [0.1, 0.3, 0.5, 0.7, 1.0, 1.3, 2.0, 3.0, 5.0, 7.0])
 def test_a_constant_that_is_seen_better_and_better_has_no_steady_state(rate):
-    """The closed loop has a root at 0, which is found to rounding, on either side: -3e-18 is no decay."""
+    """The closed loop has a root at 0, which is found to rounding, on either side: -3e-18 is no
+    decay."""
     for drift, noises, signal in (
         ([f"-{rate}*x1 + x2", "0"], [["1"], ["0"]], ["x1"]),
         (["-x1 + x3", f"-{rate}*x2", "0"], [["1"], ["1"], ["0"]], ["x1", "x2"]),

@@ -1,14 +1,19 @@
-"""Derivations made by code, from the shipped variants: right ones in unusual forms, and the same with one planted slip.
+"""Derivations made by code, from the shipped variants: right ones in unusual forms, and the same
+with one planted slip.
 
-A chain goes, for a structural function or a gain of a variant, from its definition over the expanded mean and the means of the
-noises to the moments, and on to another form of the result; SymPy and `GaussianMoments` do these steps, neither of which the
-checker calls.  Each line is then rewritten at random, by rules of algebra that keep its value: terms and factors in another
-order, brackets multiplied out, a number split into two, a power into a product, doubled and halved, a sign taken out, ^ or **,
-M[..] or M(..), one step left out, other letters for mean and variance.
+A chain goes, for a structural function or a gain of a variant, from its definition over the
+expanded mean and the means of the noises to the moments, and on to another form of the result;
+SymPy and `GaussianMoments` do these steps, neither of which the
+checker calls.  Each line is then rewritten at random, by rules of algebra that keep its value:
+terms and factors in another order, brackets multiplied out, a number split into two, a power into a
+product, doubled and halved, a sign taken out, ^ or **, M[..] or M(..), one step left out, other
+letters for mean and variance.
 
-A slip is one change of the tree of one line: a sign, a number, a power, a letter for another, a factor or a term lost, a term
-doubled, the fourth moment taken as 3 d^2, a noise's mean square forgotten.  `differs` makes sure, by SymPy, that it changes the
-value.  The lines after it are either rewritten from the line with the slip (right on top of it) or from the right one.
+A slip is one change of the tree of one line: a sign, a number, a power, a letter for another, a
+factor or a term lost, a term doubled, the fourth moment taken as 3 d^2, a noise's mean square
+forgotten.  `differs` makes sure, by SymPy, that it changes the
+value.  The lines after it are either rewritten from the line with the slip (right on top of it) or
+from the right one.
 """
 
 from __future__ import annotations
@@ -51,7 +56,8 @@ LAWS = (("m", "d"), ("m", "d"), ("mu", "P"), ("lambda", "Psi"))
 
 @dataclass(frozen=True)
 class Chain:
-    """A derivation: its headings and lines, and how to compute a line independently of the checker."""
+    """A derivation: its headings and lines, and how to compute a line independently of the
+    checker."""
 
     variant: str
     law: tuple[str, str] | None  # letters of mean and variance that a heading names
@@ -61,14 +67,21 @@ class Chain:
     noises: tuple[sp.Symbol, ...]
 
     def text(self, rng: random.Random) -> str:
-        heading = f"variant {self.variant}\n" + (f"x ~ N({self.law[0]}, {self.law[1]})\n" if self.law else "")
+        heading = f"variant {self.variant}\n" + (
+            f"x ~ N({self.law[0]}, {self.law[1]})\n" if self.law else ""
+        )
         start = f"{self.name} = "
-        return heading + start + f"\n{' ' * rng.randint(0, 4)}= ".join(typed(line, rng) for line in self.lines)
+        return (
+            heading
+            + start
+            + f"\n{' ' * rng.randint(0, 4)}= ".join(typed(line, rng) for line in self.lines)
+        )
 
 
 @dataclass(frozen=True)
 class Planted:
-    """A chain with a slip: number of the line (among the lines of the chain), kind, way to the term in its tree."""
+    """A chain with a slip: number of the line (among the lines of the chain), kind, way to the term
+    in its tree."""
 
     chain: Chain
     line: int
@@ -91,7 +104,9 @@ def chains(seed: int, count: int) -> list[Chain]:
     """Right chains of the shipped variants, in turn."""
     rng, found = random.Random(seed), []
     variants = load_variants()
-    wanted = [(name, function) for name, one in variants.items() for function in functions(one.model)]
+    wanted = [
+        (name, function) for name, one in variants.items() for function in functions(one.model)
+    ]
     rng.shuffle(wanted)
     while len(found) < count:
         variant, function = wanted[len(found) % len(wanted)]
@@ -111,7 +126,8 @@ def chains(seed: int, count: int) -> list[Chain]:
             continue
         lines = [read_line(str(one)) for one in formulas]
         if function != "K":
-            lines[2:] = [one for one in lines[2:] if rng.random() < 0.85] or lines[-1:]  # implicit steps
+            # implicit steps
+            lines[2:] = [one for one in lines[2:] if rng.random() < 0.85] or lines[-1:]
         rewritten = tuple(_rewritten(one, rng, rng.randint(0, 3)) for one in lines)
         noises = model.v if function[0] in "tT" else model.w
         found.append(Chain(variant, law, name, rewritten, moments, noises))
@@ -137,7 +153,9 @@ def functions(model: Model) -> list[str]:
     ]
 
 
-def _staged(model: Model, function: str, mean: str, cov: str) -> tuple[list[sp.Expr], GaussianMoments]:
+def _staged(
+    model: Model, function: str, mean: str, cov: str
+) -> tuple[list[sp.Expr], GaussianMoments]:
     if model.n == 1:
         m, P = sp.Matrix([symbol(mean)]), sp.Matrix([symbol(cov)])
     else:
@@ -149,7 +167,11 @@ def _staged(model: Model, function: str, mean: str, cov: str) -> tuple[list[sp.E
     law, slope = stages(model, "G", m, P)[1], stages(model, "G", m, P)[0][-1]
     (*_, noise_state, whole), _ = stages(model, "F", m, P)
     gain = P[0] * slope / whole
-    return [P[0] * slope / noise_state, gain, sp.cancel(gain) if not gain.has(sp.exp) else gain], law
+    return [
+        P[0] * slope / noise_state,
+        gain,
+        sp.cancel(gain) if not gain.has(sp.exp) else gain,
+    ], law
 
 
 # ---------------------------------------------------------------- unusual forms
@@ -175,7 +197,9 @@ def _shuffled(node: Node, rng: random.Random) -> Node | None:
         return None
     pairs = list(zip(node.parts, node.data, strict=True))
     rng.shuffle(pairs)
-    return replace(node, parts=tuple(part for part, _ in pairs), data=tuple(data for _, data in pairs))
+    return replace(
+        node, parts=tuple(part for part, _ in pairs), data=tuple(data for _, data in pairs)
+    )
 
 
 def _distributed(node: Node, rng: random.Random) -> Node | None:
@@ -201,11 +225,17 @@ def _unfolded(node: Node, rng: random.Random) -> Node | None:
         return None
     if node.data == 4 and rng.random() < 0.5:
         return power(power(node.parts[0], 2), 2)
-    return product(node.parts[0], power(node.parts[0], node.data - 1) if node.data > 2 else node.parts[0])
+    return product(
+        node.parts[0], power(node.parts[0], node.data - 1) if node.data > 2 else node.parts[0]
+    )
 
 
 def _doubled(node: Node, rng: random.Random) -> Node | None:
-    return product(number(2), node, number(2), exponents=(1, 1, -1)) if node.kind in (PRODUCT, LETTER, POWER) else None
+    return (
+        product(number(2), node, number(2), exponents=(1, 1, -1))
+        if node.kind in (PRODUCT, LETTER, POWER)
+        else None
+    )
 
 
 def _negated(node: Node, rng: random.Random) -> Node | None:
@@ -216,13 +246,28 @@ def _negated(node: Node, rng: random.Random) -> Node | None:
 
 def _squared(node: Node, rng: random.Random) -> Node | None:
     """A square of a sum multiplied out."""
-    if node.kind != POWER or node.data != 2 or node.parts[0].kind != SUM or len(node.parts[0].parts) != 2:
+    if (
+        node.kind != POWER
+        or node.data != 2
+        or node.parts[0].kind != SUM
+        or len(node.parts[0].parts) != 2
+    ):
         return None
     (a, b), (s, t) = node.parts[0].parts, node.parts[0].data
     return total(power(a, 2), product(number(2), a, b), power(b, 2), signs=(1, s * t, 1))
 
 
-RULES = (_shuffled, _shuffled, _distributed, _distributed, _split, _unfolded, _doubled, _negated, _squared)
+RULES = (
+    _shuffled,
+    _shuffled,
+    _distributed,
+    _distributed,
+    _split,
+    _unfolded,
+    _doubled,
+    _negated,
+    _squared,
+)
 
 
 # ---------------------------------------------------------------- slips
@@ -258,7 +303,13 @@ def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
             where = where[:-1]
         follows = rng.random() < 0.5
         rest = [_rewritten(new if follows else one, rng, 2) for one in chain.lines[i + 1 :]]
-        return Planted(replace(chain, lines=(*chain.lines[:i], new, *rest)), i, slip.__name__.strip("_"), where, follows)
+        return Planted(
+            replace(chain, lines=(*chain.lines[:i], new, *rest)),
+            i,
+            slip.__name__.strip("_"),
+            where,
+            follows,
+        )
     return None
 
 
@@ -287,16 +338,22 @@ def _sign(line, path, node, rng, chain):
 
 def _number(line, path, node, rng, chain):
     if node.kind == NUMBER:
-        return _term(line, path), changed(line, path, number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2))
+        return _term(line, path), changed(
+            line, path, number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2)
+        )
     if node.kind == PRODUCT:
-        return _term(line, path), changed(line, path, product(number(rng.choice((2, 3, Fraction(1, 2)))), node))
+        return _term(line, path), changed(
+            line, path, product(number(rng.choice((2, 3, Fraction(1, 2)))), node)
+        )
     return None
 
 
 def _power(line, path, node, rng, chain):
     if node.kind != POWER or node.data.denominator != 1 or node.data < 1:
         return None
-    return _term(line, path), changed(line, path, power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data])))
+    return _term(line, path), changed(
+        line, path, power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data]))
+    )
 
 
 def _letter(line, path, node, rng, chain):
@@ -312,7 +369,9 @@ def _lost_factor(line, path, node, rng, chain):
     if node.kind != PRODUCT or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
-    if node.parts[i].kind not in (LETTER, POWER) or (node.parts[i].parts and node.parts[i].parts[0].kind != LETTER):
+    if node.parts[i].kind not in (LETTER, POWER) or (
+        node.parts[i].parts and node.parts[i].parts[0].kind != LETTER
+    ):
         return None
     return _term(line, path), changed(line, (*path, i), number(1))
 
@@ -330,15 +389,20 @@ def _twice(line, path, node, rng, chain):
     if node.kind != SUM or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
-    return path, changed(line, path, Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i])))
+    return path, changed(
+        line, path, Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i]))
+    )
 
 
 def _moment(line, path, node, rng, chain):
-    """Put 3 d^2, or the fourth power of the mean, in the place of a fourth moment that is computed in this line."""
+    """Put 3 d^2, or the fourth power of the mean, in the place of a fourth moment that is computed
+    in this line."""
     mean, cov = chain.moments.mean[0], chain.moments.cov[0, 0]
     if node.kind != SUM or differs_formula(chain, node, mean**4 + 6 * mean**2 * cov + 3 * cov**2):
         return None
-    return _term(line, path), changed(line, path, read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2)))))
+    return _term(line, path), changed(
+        line, path, read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2))))
+    )
 
 
 def _noise(line, path, node, rng, chain):
@@ -351,7 +415,9 @@ def _noise(line, path, node, rng, chain):
     parent = at(line, term[:-1])
     keep = [j for j in range(len(parent.parts)) if j != term[-1]]
     return term[:-1], changed(
-        line, term[:-1], Node(SUM, tuple(parent.parts[j] for j in keep), tuple(parent.data[j] for j in keep))
+        line,
+        term[:-1],
+        Node(SUM, tuple(parent.parts[j] for j in keep), tuple(parent.data[j] for j in keep)),
     )
 
 

@@ -1,7 +1,9 @@
-"""The checker of derivations on chains made by code: right ones in unusual forms, and the same with one planted slip.
+"""The checker of derivations on chains made by code: right ones in unusual forms, and the same with
+one planted slip.
 
-How chains and slips are made says `derivation_corpus`.  A slip counts as *named* if the checker names a kind and a term at the
-line where it was planted; as named *falsely* if that term, in the text, neither overlaps what was changed nor contains it.
+How chains and slips are made says `derivation_corpus`.  A slip counts as *named* if the checker
+names a kind and a term at the line where it was planted; as named *falsely* if that term, in the
+text, neither overlaps what was changed nor contains it.
 """
 
 import os
@@ -21,7 +23,8 @@ from kfcourse.derivations.verdicts import Report
 from kfcourse.lab import find_variant, load_variants
 from kfcourse.symbolic.structure import gaussian, linearised
 
-COUNT = 200 if int(os.environ.get("KFCOURSE_CASES", "1000")) > 1000 else 40  # all 200 with `make fuzz`
+# all 200 with `make fuzz`
+COUNT = 200 if int(os.environ.get("KFCOURSE_CASES", "1000")) > 1000 else 40
 NAMED = 0.9
 
 
@@ -53,7 +56,17 @@ def test_right_chains_in_unusual_forms_are_accepted():
 
 def test_slips_of_every_kind_are_planted():
     assert {one.kind for one, _, _ in checked_slips()} == {
-        *("sign", "number", "power", "letter", "lost_factor", "lost_term", "twice", "moment", "noise")
+        *(
+            "sign",
+            "number",
+            "power",
+            "letter",
+            "lost_factor",
+            "lost_term",
+            "twice",
+            "moment",
+            "noise",
+        )
     }
     assert len(checked_slips()) == COUNT
 
@@ -85,14 +98,16 @@ def test_after_a_slip_lines_are_right_on_top_of_it_or_right_in_themselves():
             if verdict.line > report.first.line:
                 later += 1
                 first = verdict.line == report.first.line + 1
-                assert verdict.status == ("follows" if one.follows else "right in itself" if first else "right"), (
-                    f"{text}\n\n{report}"
-                )
+                assert verdict.status == (
+                    "follows" if one.follows else "right in itself" if first else "right"
+                ), f"{text}\n\n{report}"
     assert later > COUNT / 4
 
 
 @pytest.mark.parametrize("name", load_variants())
-@pytest.mark.parametrize(("kind", "structure"), [("gaussian", gaussian), ("linearised", linearised)])
+@pytest.mark.parametrize(
+    ("kind", "structure"), [("gaussian", gaussian), ("linearised", linearised)]
+)
 def test_names_mean_the_package_s_structural_functions(name, kind, structure):
     model = find(name)
     setting, formulas = of_model(model, kind), structure(model)
@@ -112,9 +127,14 @@ def test_names_mean_the_package_s_structural_functions(name, kind, structure):
                 if entry not in here.meanings:
                     assert entry in model.parameters
                     continue
-                formula = matrix[i, j].replace(lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
+                formula = matrix[i, j].replace(
+                    lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1
+                )
                 assert compare(here, letter(entry), tree_of(formula)) == EQUAL, entry
-                assert compare(here, letter(entry), tree_of(formula * sp.Rational(1001, 1000) + 1)) == DIFFERENT, entry
+                assert (
+                    compare(here, letter(entry), tree_of(formula * sp.Rational(1001, 1000) + 1))
+                    == DIFFERENT
+                ), entry
                 compared += 1
     assert compared >= 4
 
@@ -141,7 +161,8 @@ def verdict_of(text: str):
         ("g^2*d + g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "doubled", "g^2*d", "normal law"),
         ("g^2*d + f^2*3*d^2", "moment", "f^2*3*d^2", "normal law"),
         ("g^2*d + f^2*(m^2 + d)^2", "moment", "f^2*(m^2 + d)^2", "normal law"),
-        ("g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2", "moment", "f^2*M[x^4]", "normal law"),  # no one term has it
+        # no one term has it
+        ("g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2", "moment", "f^2*M[x^4]", "normal law"),
         ("g^2*d", "lost", "g^2*d", "normal law"),
     ],
 )
@@ -159,7 +180,9 @@ def test_a_slip_is_named_by_kind_term_and_rule(line, kind, term, rule):
         ("M[(g*x + f*x^2*w)^2]", "lost", "M[(g*x + f*x^2*w)^2]"),
     ],
 )
-def test_of_a_first_line_the_definition_is_the_hint_and_nothing_of_the_key_is_shown(line, kind, term):
+def test_of_a_first_line_the_definition_is_the_hint_and_nothing_of_the_key_is_shown(
+    line, kind, term
+):
     found = verdict_of(f"{HEAD}F = {line}")
     assert (found.kinds, found.terms) == ((kind,), (term,))
     assert found.rule.startswith("F is the mean square")
@@ -182,14 +205,23 @@ def test_a_noise_forgotten_and_a_noise_of_mean_one():
     start = f"{HEAD}F = M[(g*x + f*x^2*w - g*m)^2]\n = "
     assert verdict_of(start + "g^2*M[(x-m)^2]").kinds == ("noise-forgotten",)
     cross = verdict_of(start + "g^2*M[(x-m)^2] + 2*g*f*M[(x-m)*x^2] + f^2*M[x^4]")
-    assert (cross.kinds, cross.terms) == (("lost-factor",), ("2*g*f*M[(x-m)*x^2]",))  # with w its mean is zero
+    # with w its mean is zero
+    assert (cross.kinds, cross.terms) == (("lost-factor",), ("2*g*f*M[(x-m)*x^2]",))
     for found in (verdict_of(start + "g^2*M[(x-m)^2]"), cross):
         assert "M[w^2] = 1" in found.rule
 
 
 def test_what_was_derived_wrongly_is_gone_on_with():
-    text = f"{HEAD}h = M[g*x + f*x^2*w]\n = g*M[x] + f*M[x^2]\n = g*m + f*(m^2 + d)\n\nF = M[(g*x + f*x^2*w - g*m - f*(m^2+d))^2]"
-    assert [one.status for one in check_text(text, find).verdicts] == ["right", "differs", "follows", "right"]
+    text = (
+        f"{HEAD}h = M[g*x + f*x^2*w]\n = g*M[x] + f*M[x^2]\n = g*m + f*(m^2 + d)\n\nF = M[(g*x "
+        f"+ f*x^2*w - g*m - f*(m^2+d))^2]"
+    )
+    assert [one.status for one in check_text(text, find).verdicts] == [
+        "right",
+        "differs",
+        "follows",
+        "right",
+    ]
 
 
 def test_without_a_model_letters_are_free_and_a_gain_is_a_quotient():

@@ -1,4 +1,5 @@
-"""Adding a set touches one folder: it is found, checked and rendered without a word anywhere else."""
+"""Adding a set touches one folder: it is found, checked and rendered without a word anywhere
+else."""
 
 from textwrap import dedent
 
@@ -42,7 +43,11 @@ def twice(x):
 def package(tmp_path, monkeypatch):
     """A package of sets beside the course's own."""
     folder = tmp_path / "own_sets"
-    for name, text in {"y_doubling/questions.py": QUESTIONS, "y_doubling/statement.md": STATEMENT, "notes/no_set.py": ""}.items():
+    for name, text in {
+        "y_doubling/questions.py": QUESTIONS,
+        "y_doubling/statement.md": STATEMENT,
+        "notes/no_set.py": "",
+    }.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(dedent(text).lstrip())
     monkeypatch.syspath_prepend(tmp_path)
@@ -69,4 +74,6 @@ def test_a_letter_is_taken_once():
 
 def test_every_folder_is_a_set():
     folder = sets()["a"].folder.parent
-    assert sorted(one.folder for one in sets().values()) == sorted(path.parent for path in folder.glob("*/statement.md"))
+    assert sorted(one.folder for one in sets().values()) == sorted(
+        path.parent for path in folder.glob("*/statement.md")
+    )

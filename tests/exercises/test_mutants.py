@@ -1,8 +1,9 @@
-"""Slips nobody thought of: worked solutions with one thing changed are wrong, and most are told what is wrong.
+"""Slips nobody thought of: worked solutions with one thing changed are wrong, and most are told
+what is wrong.
 
-Seeded single changes of the source: a sign, a dropped term, a product for a quotient, a lost power or transposition,
-arguments exchanged, a number.  The seed changes with the week, so that the sets meet new ones all the time;
-MUTANTS=<seed> repeats a run.
+Seeded single changes of the source: a sign, a dropped term, a product for a quotient, a lost power
+or transposition, arguments exchanged, a number.  The seed changes with the week, so that the sets
+meet new ones all the time; MUTANTS=<seed> repeats a run.
 """
 
 import ast
@@ -34,7 +35,11 @@ def changes(node):
         yield node.value
     elif isinstance(node, ast.Call) and len(node.args) == 2 and not node.keywords:
         yield ast.Call(node.func, node.args[::-1], [])
-    elif isinstance(node, ast.Constant) and type(node.value) in (int, float) and node.value not in (0, -1):
+    elif (
+        isinstance(node, ast.Constant)
+        and type(node.value) in (int, float)
+        and node.value not in (0, -1)
+    ):
         yield ast.Constant(node.value + 1)
 
 
@@ -47,7 +52,9 @@ def mutants(source):
 
             class Replace(ast.NodeTransformer):
                 def visit(self, node, target=target, number=number):
-                    return list(changes(node))[number] if node is target else self.generic_visit(node)
+                    return (
+                        list(changes(node))[number] if node is target else self.generic_visit(node)
+                    )
 
             yield ast.unparse(ast.fix_missing_locations(Replace().visit(tree)))
 
@@ -73,16 +80,23 @@ def outcomes():
     matplotlib.use("agg")
     rows = []
     for letter in sets():
-        lab, fresh = exercise(letter, "53"), Exercise(letter, exercise(letter, "53").variant, salt="fresh")
+        lab, fresh = (
+            exercise(letter, "53"),
+            Exercise(letter, exercise(letter, "53").variant, salt="fresh"),
+        )
         space, sources = written(lab)
         for question in lab.questions.values():
             possible = list(mutants(sources[question.function]))
-            for source in random.Random(f"{SEED}{question.name}").sample(possible, min(EACH, len(possible))):
+            for source in random.Random(f"{SEED}{question.name}").sample(
+                possible, min(EACH, len(possible))
+            ):
                 names = dict(space)
                 exec(source, names)
                 answer = names[question.function]
                 result = engine.check(question, lab, answer, seconds=5)
-                again = engine.check(question, fresh, answer, seconds=5) if result.passed else result
+                again = (
+                    engine.check(question, fresh, answer, seconds=5) if result.passed else result
+                )
                 rows.append((question, source, result, again))
     return rows
 
@@ -90,7 +104,9 @@ def outcomes():
 def test_what_passes_is_right(outcomes):
     """With other hidden arguments too; and few changes change nothing."""
     passed = [(question.name, source) for question, source, result, _ in outcomes if result.passed]
-    assert [source for _, source, result, again in outcomes if result.passed and not again.passed] == []
+    assert [
+        source for _, source, result, again in outcomes if result.passed and not again.passed
+    ] == []
     assert len(passed) <= 0.15 * len(outcomes), passed
 
 
@@ -100,7 +116,14 @@ def test_no_check_fails_in_itself(outcomes):
 
 
 def test_most_are_told_what_is_wrong(outcomes):
-    """By a known mistake or a hint.  Of 270 some 15 % are merely wrong, give or take 2: four of these below."""
-    told = Counter(bool(set(result.diagnosis) - SIZE) for *_, result, _ in outcomes if result.status == "wrong")
-    merely = [source for _, source, result, _ in outcomes if result.status == "wrong" and not set(result.diagnosis) - SIZE]
+    """By a known mistake or a hint.  Of 270 some 15 % are merely wrong, give or take 2: four of
+    these below."""
+    told = Counter(
+        bool(set(result.diagnosis) - SIZE) for *_, result, _ in outcomes if result.status == "wrong"
+    )
+    merely = [
+        source
+        for _, source, result, _ in outcomes
+        if result.status == "wrong" and not set(result.diagnosis) - SIZE
+    ]
     assert told[True] >= 0.75 * sum(told.values()), merely

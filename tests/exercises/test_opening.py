@@ -23,6 +23,8 @@ def test_no_such_set_question_or_variant():
 
 
 def test_a_variant_of_ones_own():
-    lab = exercise("a", {"name": "mine", "state": "q*x + v", "meter": "x + w", "parameters": {"q": 0.5}})
+    lab = exercise(
+        "a", {"name": "mine", "state": "q*x + v", "meter": "x + w", "parameters": {"q": 0.5}}
+    )
     q = sp.Symbol("q", real=True)
     assert lab.check("a2", lambda z, p: (q * z, q**2 * p + 1)).passed

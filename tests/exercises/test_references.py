@@ -1,4 +1,5 @@
-"""Keys of sets f, g, h, j, l, o, p against independent references: the package's filters, derivatives, an integrator."""
+"""Keys of sets f, g, h, j, l, o, p against independent references: the package's filters,
+derivatives, an integrator."""
 
 import numpy as np
 import pytest
@@ -28,14 +29,20 @@ from kfcourse.symbolic.moments import GaussianMoments
 
 
 def test_the_grid_is_the_kalman_filter_on_a_linear_model():
-    model = Model.define("c*x + e*v", "g*x + f*w", dict(c=0.8, e=0.6, g=1.7, f=0.7), prior=dict(mean=0.4, variance=1.3))
+    model = Model.define(
+        "c*x + e*v",
+        "g*x + f*w",
+        dict(c=0.8, e=0.6, g=1.7, f=0.7),
+        prior=dict(mean=0.4, variance=1.3),
+    )
     y = simulate(model, 1, 9, seed=3).y
     y[4] = np.nan
     x = np.linspace(-9, 9, 700)
     prior = grid.normal(x, 0.4, 1.3)
     z, p, total = grid.run_filter(y[:, 0, 0], x, prior, *companion.laws(model))
     law, before = run(kalman_filter(model), y), predictions(kalman_filter(model), y)
-    # step 0.026, narrowest density 0.4: the rule's error is below rounding (formula of the chapter); 8 steps of rounding
+    # step 0.026, narrowest density 0.4: the rule's error is below rounding (formula of the
+    # chapter); 8 steps of rounding
     np.testing.assert_allclose(z, law.mean[:, 0, 0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(p, law.cov[:, 0, 0, 0], rtol=1e-11)
     F = 1.7**2 * before.cov[:, 0, 0, 0] + 0.49
@@ -54,7 +61,11 @@ def test_the_extended_filter_is_the_package_s(name):
         list(model.state_equation),
         list(model.meter_equation),
         {k: float(v) for k, v in model.parameters.items()},
-        symbols={"x": [s.name for s in model.x], "v": [s.name for s in model.v], "w": [s.name for s in model.w]},
+        symbols={
+            "x": [s.name for s in model.x],
+            "v": [s.name for s in model.v],
+            "w": [s.name for s in model.w],
+        },
         prior={"mean": mean, "variance": cov},
     )
     z, p, lam, Psi = extended.run_filter(y, mean, cov, *functions)
@@ -64,7 +75,9 @@ def test_the_extended_filter_is_the_package_s(name):
         np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
     found = extended.consistency(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
     np.testing.assert_allclose(found[0], nees(x, law).mean(axis=1), rtol=1e-6)
-    np.testing.assert_allclose(found[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(
+        found[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6
+    )
 
 
 def test_hidden_jacobians_are_derivatives():
@@ -87,7 +100,9 @@ def test_continuous_numbers():
         D, K = continuous_time.steady_state(*arguments)
         a, s, h, S_xi, N = arguments
         letters = {"a": a, "s": s, "h": h}
-        model = ContinuousModel.define("-a*x", "s", "h*x", letters, spectral_density=S_xi, noise_density=N)
+        model = ContinuousModel.define(
+            "-a*x", "s", "h*x", letters, spectral_density=S_xi, noise_density=N
+        )
         assert tuple(pytest.approx(matrix.item()) for matrix in steady_state(model)) == (D, K)
         scalar = [np.array([[v]]) for v in (D, -a, s, h, S_xi, N)]
         assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
@@ -99,13 +114,21 @@ def test_continuous_numbers():
 def test_two_steps_of_modes_are_the_package_s_filter(variant):
     for y, m, d, a, q, C, pi, first in modes_questions.two_measurements(exercise("o", variant)):
         models = [
-            Model.define("a*x + s*v", "x + C*w", {"a": a, "s": np.sqrt(q), "C": c}, prior={"mean": m, "variance": d}) for c in C
+            Model.define(
+                "a*x + s*v",
+                "x + C*w",
+                {"a": a, "s": np.sqrt(q), "C": c},
+                prior={"mean": m, "variance": d},
+            )
+            for c in C
         ]
         one = logic_dynamic([gaussian(model) for model in models], pi, first)
         before = one.step(one.init(1), y[:1, None])
         after = one.step(before, y[1:, None])
         found = modes.two_steps(y, m, d, a, q, C, pi, first)
-        np.testing.assert_allclose(found, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12)
+        np.testing.assert_allclose(
+            found, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12
+        )
 
 
 # -- keys that are formulas: the package has them otherwise
@@ -122,11 +145,20 @@ def test_the_alpha_beta_filter_and_its_gains_are_the_package_s():
     key, calls = asked("j", "j4")
     for y, T, alpha, beta, r, v in calls:
         prior = {"mean": np.array([*r, *v]), "variance": np.ones(2 * len(r))}
-        laws = run(alphabeta.alpha_beta(kinematic(T, dimensions=len(r), prior=prior), alpha, beta, start="prior"), y)
-        np.testing.assert_allclose(np.concatenate(key(y, T, alpha, beta, r, v), axis=-1), laws.mean, rtol=1e-10, atol=1e-12)
+        laws = run(
+            alphabeta.alpha_beta(
+                kinematic(T, dimensions=len(r), prior=prior), alpha, beta, start="prior"
+            ),
+            y,
+        )
+        np.testing.assert_allclose(
+            np.concatenate(key(y, T, alpha, beta, r, v), axis=-1), laws.mean, rtol=1e-10, atol=1e-12
+        )
     key, calls = asked("j", "j3")
     for (alpha,) in calls:
-        assert key(alpha) == pytest.approx((alphabeta.steady_beta(alpha), alphabeta.tracking_index(alpha)))
+        assert key(alpha) == pytest.approx(
+            (alphabeta.steady_beta(alpha), alphabeta.tracking_index(alpha))
+        )
 
 
 def test_late_measurements_are_fused_as_by_the_package():
@@ -134,7 +166,10 @@ def test_late_measurements_are_fused_as_by_the_package():
     for tags, arrivals, values, m, P, q, r, now in calls:
         sensor = Sensor.define("receiver", ["s", "V"], "s + w", variance=r, period=1.0)
         rows = zip(tags, arrivals, values, strict=True)
-        seen = [Observation("receiver", float(tag), float(at), np.array([[value]])) for tag, at, value in rows]
+        seen = [
+            Observation("receiver", float(tag), float(at), np.array([[value]]))
+            for tag, at, value in rows
+        ]
         vehicle = Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
         law = fuse(vehicle, [sensor], Gaussian(m, P), seen, np.array([now]))
         mean, cov = key(tags, arrivals, values, m, P, q, r, now)
@@ -146,7 +181,11 @@ def test_formulas_without_a_slip_are_moments_of_the_package():
     x1, x2, v, w1, w2, a, q, G, gamma, r = sp.symbols("x1 x2 v w1 w2 a q G gamma r", real=True)
     m1, m2, d11, d12, d22 = law = sp.symbols("m1 m2 d11 d12 d22", real=True)
     root = sp.Symbol("root", positive=True)
-    pair = GaussianMoments([x1, x2, v, w1, w2], [m1, m2, 0, 0, 0], sp.diag(sp.Matrix([[d11, d12], [d12, d22]]), 1, 1, r))
+    pair = GaussianMoments(
+        [x1, x2, v, w1, w2],
+        [m1, m2, 0, 0, 0],
+        sp.diag(sp.Matrix([[d11, d12], [d12, d22]]), 1, 1, r),
+    )
     square = pair.mean_of(sp.expand((a * x1 + root * v) ** 2)).subs(root, sp.sqrt(q))
     assert sp.simplify(slips.second_moment(a, q, m1, d11) - square) == 0
     y = gamma * (G * x1 + w2)

@@ -1,4 +1,5 @@
-"""Right answers in unusual forms pass: written from the statements alone, in none of the ways of the worked solutions."""
+"""Right answers in unusual forms pass: written from the statements alone, in none of the ways of
+the worked solutions."""
 
 import numpy as np
 import pytest
@@ -46,7 +47,11 @@ def correction(covariance):
 def centred(target, regressor):
     r_, t = regressor - regressor.mean(axis=0), target - target.mean(axis=0)
     B = np.linalg.lstsq(r_, t, rcond=None)[0].T
-    return B, target.mean(axis=0) - B @ regressor.mean(axis=0), (t - r_ @ B.T).T @ (t - r_ @ B.T) / len(t)
+    return (
+        B,
+        target.mean(axis=0) - B @ regressor.mean(axis=0),
+        (t - r_ @ B.T).T @ (t - r_ @ B.T) / len(t),
+    )
 
 
 def designed(start=lambda mean: mean):
@@ -110,7 +115,9 @@ def i5_column_by_column(lam, S, y, H, R):
                 c, s = M[row, row] / size, M[row, column] / size
                 M[:, [row, column]] = M[:, [row, column]] @ np.array([[c, -s], [s, c]])
     Z = M[p:, p:]
-    return lam + M[p:, :p] @ np.linalg.solve(M[:p, :p], y - H @ lam), Z * np.where(np.diag(Z) < 0, -1, 1)
+    return lam + M[p:, :p] @ np.linalg.solve(M[:p, :p], y - H @ lam), Z * np.where(
+        np.diag(Z) < 0, -1, 1
+    )
 
 
 def j1_by_rotations(r, phi, eps):
@@ -120,7 +127,8 @@ def j1_by_rotations(r, phi, eps):
 
 
 def j3_by_the_filter(alpha):
-    """The index at which the gain of a Kalman filter converges to alpha, by bisection; T and sigma are 1."""
+    """The index at which the gain of a Kalman filter converges to alpha, by bisection; T and sigma
+    are 1."""
     A, b, H = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]]), np.array([[1, 0]])
     low, high = 1e-4, 1e4
     while high / low > 1 + 1e-13:
@@ -169,11 +177,15 @@ def m5_at_once(z, p, ahead, Psi, A, Q):
             J[both, both] += D.T @ np.linalg.solve(Q, D)
             b[both] += D.T @ np.linalg.solve(Q, c)
     P = np.linalg.inv(J)
-    return (P @ b).reshape(steps, n), np.array([P[k * n : k * n + n, k * n : k * n + n] for k in range(steps)])
+    return (P @ b).reshape(steps, n), np.array(
+        [P[k * n : k * n + n, k * n : k * n + n] for k in range(steps)]
+    )
 
 
 def n4_by_whitening(nu, F, probability):
-    white = np.stack([np.linalg.solve(np.linalg.cholesky(cov), entry) for entry, cov in zip(nu, F, strict=True)])
+    white = np.stack(
+        [np.linalg.solve(np.linalg.cholesky(cov), entry) for entry, cov in zip(nu, F, strict=True)]
+    )
     return np.linalg.norm(white, axis=1) ** 2, -chi2.isf(1 - probability, 3) * -1
 
 
@@ -191,25 +203,58 @@ RIGHT = [
     ("a1", "53", lambda z: sp.Matrix([c, e * z])),
     ("a2", "53", lambda z, p: [[c * z], [(c * sp.sqrt(p)) ** 2 + (e * z) ** 2]]),
     ("a2", "53", lambda z, p: [z * c, p * c**2 + (e * z) ** 2]),
-    ("a3", "5", lambda m, d: (g * sp.sin(m), g * sp.cos(m), g**2 * (1 - sp.sin(m) ** 2) * d + f**2)),
+    (
+        "a3",
+        "5",
+        lambda m, d: (g * sp.sin(m), g * sp.cos(m), g**2 * (1 - sp.sin(m) ** 2) * d + f**2),
+    ),
     ("a3", "20", lambda m, d: ([m[0]], [1, 0], [[d[0, 0] + r**2]])),
     ("a4", "53", lambda z, p: (c * z, p * (c**2 + e**2) + e**2 * z**2)),
     ("a5", "53", lambda m, d: (g * m, g, g**2 * d + f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2))),
-    ("a5", "generated", lambda m, d: (g * m + q * (m**2 + d), g + 2 * q * m, (g + 2 * q * m) ** 2 * d + 2 * (q * d) ** 2 + f**2)),
+    (
+        "a5",
+        "generated",
+        lambda m, d: (
+            g * m + q * (m**2 + d),
+            g + 2 * q * m,
+            (g + 2 * q * m) ** 2 * d + 2 * (q * d) ** 2 + f**2,
+        ),
+    ),
     ("a6", "20", lambda m, d: sp.Matrix([[r**2]])),
     ("a6", "53", lambda m, d: f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2)),
-    ("a7", "53", lambda: "F = M[(g*(x - m) + f*x^2*w)^2]\n= g^2*d + f^2*M[x^4]\n= g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)"),
     (
         "a7",
         "53",
-        lambda: "F = M[y^2] - h^2\n= g^2*(m^2 + d) + f^2*M[x**4] - (g*m)^2\n= d*g^2 + f^2*((m^2 + 3*d)^2 - 6*d^2)  # done",
+        lambda: (
+            "F = M[(g*(x - m) + f*x^2*w)^2]\n= g^2*d + f^2*M[x^4]\n= g^2*d + f^2*(m^4 + 6*m^2*d + "
+            "3*d^2)"
+        ),
+    ),
+    (
+        "a7",
+        "53",
+        lambda: (
+            "F = M[y^2] - h^2\n= g^2*(m^2 + d) + f^2*M[x**4] - (g*m)^2\n= d*g^2 + f^2*((m^2 + "
+            "3*d)^2 - 6*d^2)  # done"
+        ),
     ),
     ("b1", "53", lambda Psi, G, F: T(np.linalg.solve(F, G @ Psi))),
-    ("b1", "20", lambda Psi, G, F: [(P @ H.T @ np.linalg.pinv(V)).tolist() for P, H, V in zip(Psi, G, F, strict=True)]),
+    (
+        "b1",
+        "20",
+        lambda Psi, G, F: [
+            (P @ H.T @ np.linalg.pinv(V)).tolist() for P, H, V in zip(Psi, G, F, strict=True)
+        ],
+    ),
     ("b2", "53", correction(lambda Psi, K, G, F: Psi - K @ F @ T(K))),
-    # the state's components differ by a factor of a thousand: an inverse keeps its digits all the same
+    # the state's components differ by a factor of a thousand: an inverse keeps its digits all the
+    # same
     ("b2", "D3", correction(lambda Psi, K, G, F: Psi - K @ G @ Psi)),
-    ("b5", "5", lambda Psi, G, F, R: np.linalg.inv(np.linalg.inv(Psi) + T(G) @ np.linalg.inv(R) @ G)),
+    (
+        "b5",
+        "5",
+        lambda Psi, G, F, R: np.linalg.inv(np.linalg.inv(Psi) + T(G) @ np.linalg.inv(R) @ G),
+    ),
     ("b5", "20", joseph),
     ("c2", "generated", centred),
     ("c4", "53", designed()),
@@ -217,7 +262,11 @@ RIGHT = [
     ("e1", "53", lambda x, z: np.einsum("kni,kni->k", x - z, x - z) / x.shape[1]),
     ("e5", "53", nees_per_component),
     ("h1", "53", lambda S_xi, N, T: [0.5 * S_xi / T, 0.5 * N / T]),
-    ("j3", "5", lambda a: (2 * (1 - np.sqrt(1 - a)) ** 2, 2 * (1 - np.sqrt(1 - a)) ** 2 / np.sqrt(1 - a))),
+    (
+        "j3",
+        "5",
+        lambda a: (2 * (1 - np.sqrt(1 - a)) ** 2, 2 * (1 - np.sqrt(1 - a)) ** 2 / np.sqrt(1 - a)),
+    ),
     ("l2", "53", lambda reading, rate, shift: reading / rate - shift / rate),
     ("m1", "53", lambda beta: 2 * np.log(1 / (1 - beta))),
     ("m2", "53", lambda nu, F: -sp.log(sp.sqrt(2 * sp.pi * F)) - (nu / sp.sqrt(F)) ** 2 / 2),
@@ -225,7 +274,8 @@ RIGHT = [
     ("p2", "53", lambda gamma, G, d, r: (gamma * G) ** 2 * d + gamma**2 * r),
     ("p8", "53", lambda x, mode: (x.mean(), x.var())),
     ("r4", "53", lambda p, A, D, T: p * A**2 / D / T / 4 / sp.pi),
-    ("r4", "53", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * np.pi * T)),  # pi with the digits of a float
+    # pi with the digits of a float
+    ("r4", "53", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * np.pi * T)),
     ("r5", "53", lambda variance, q: np.array([one_time(s, q) for s in variance])),
     ("f2", "53", f2_by_logarithms),
     ("h4", "53", h4_solved),
@@ -242,7 +292,10 @@ RIGHT = [
 ]
 
 
-@pytest.mark.parametrize(("name", "variant", "answer"), [pytest.param(*row, id=f"{row[0]}-{i}") for i, row in enumerate(RIGHT)])
+@pytest.mark.parametrize(
+    ("name", "variant", "answer"),
+    [pytest.param(*row, id=f"{row[0]}-{i}") for i, row in enumerate(RIGHT)],
+)
 def test_right_answers_in_unusual_forms_pass(name, variant, answer):
     result = exercise(name[0], GENERATED if variant == "generated" else variant).check(name, answer)
     assert result.passed, result

@@ -11,7 +11,11 @@ from kfcourse.notebooks.master import read, render, without_solution
 
 pytestmark = pytest.mark.quick
 
-QUESTIONS = [pytest.param(letter, question, id=question.name) for letter, one in sets().items() for question in one.questions]
+QUESTIONS = [
+    pytest.param(letter, question, id=question.name)
+    for letter, one in sets().items()
+    for question in one.questions
+]
 
 
 def notebook(letter):
@@ -20,8 +24,17 @@ def notebook(letter):
 
 def stubs(letter):
     """Functions of the student's notebook that still have to be written: name to arguments."""
-    cells = [without_solution(cell.source, code=True) for cell in notebook(letter).cells if cell.cell_type == "code"]
-    found = [node for source in cells for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
+    cells = [
+        without_solution(cell.source, code=True)
+        for cell in notebook(letter).cells
+        if cell.cell_type == "code"
+    ]
+    found = [
+        node
+        for source in cells
+        for node in ast.parse(source).body
+        if isinstance(node, ast.FunctionDef)
+    ]
     return {node.name: [argument.arg for argument in node.args.args] for node in found}
 
 

@@ -31,12 +31,17 @@ def test_the_coefficients_are_the_stationary_kalman_gain(alpha, order):
     beta, gamma = steady_beta(alpha), steady_beta(alpha) ** 2 / alpha
     index = tracking_index(alpha) if order == 1 else gamma / (2 * np.sqrt(1 - alpha))
     sigma = 30.0
-    model = kinematic(T, dimensions=1, order=order, noise_sd=index * sigma / T**2, measurement_sd=sigma)
+    model = kinematic(
+        T, dimensions=1, order=order, noise_sd=index * sigma / T**2, measurement_sd=sigma
+    )
     system, _, _ = linear_system(model)
     predicted, _, _ = control.dare(system.A.T, system.H.T, system.Q, system.R)
     gain = predicted @ system.H.T / (system.H @ predicted @ system.H.T + system.R)
-    # The Riccati equation loses digits where the noises differ much: alpha = 0.01 has an index of 5e-5, squared 2.5e-9.
-    np.testing.assert_allclose(gain[:, 0], np.array([alpha, beta / T, gamma / (2 * T**2)])[: order + 1], rtol=1e-6)
+    # The Riccati equation loses digits where the noises differ much: alpha = 0.01 has an index of
+    # 5e-5, squared 2.5e-9.
+    np.testing.assert_allclose(
+        gain[:, 0], np.array([alpha, beta / T, gamma / (2 * T**2)])[: order + 1], rtol=1e-6
+    )
 
 
 # --- the estimates
@@ -46,11 +51,14 @@ PRIOR = {"mean": [4.0, -7.0, 3.0, 1.5], "variance": [50.0, 30.0, 9.0, 4.0]}
 
 
 def planar(**changes):
-    return kinematic(**(dict(interval=T, dimensions=2, noise_sd=0.8, measurement_sd=5.0, prior=PRIOR) | changes))
+    return kinematic(
+        **(dict(interval=T, dimensions=2, noise_sd=0.8, measurement_sd=5.0, prior=PRIOR) | changes)
+    )
 
 
 def slow_alpha_beta(measurements, alpha, beta, growing):
-    """One axis in plain floats: the first two measurements, at any distance, then the gains; coasting over NaN."""
+    """One axis in plain floats: the first two measurements, at any distance, then the gains;
+    coasting over NaN."""
     known, last, estimates, position, speed = 0, None, [], None, 0.0
     for k, y in enumerate(measurements):
         if known:
@@ -79,10 +87,14 @@ def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop(gains):
     found = run(alpha_beta(model, alpha, beta, gains=gains), y).mean
     for trajectory in range(4):
         for axis in range(2):
-            expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta, growing=gains != "constant")
+            expected = slow_alpha_beta(
+                y[:, trajectory, axis], alpha, beta, growing=gains != "constant"
+            )
             for k, values in enumerate(expected):
                 if values[0] is not None:  # nothing is known before the first measurement
-                    np.testing.assert_allclose(found[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING)
+                    np.testing.assert_allclose(
+                        found[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING
+                    )
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -91,7 +103,11 @@ def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
     model = kinematic(T, dimensions=1, order=order, measurement_sd=5.0)
     alpha = 1e-3
     beta = steady_beta(alpha)
-    one = alpha_beta(model, alpha, beta) if order == 1 else alpha_beta_gamma(model, alpha, beta, beta**2 / alpha)
+    one = (
+        alpha_beta(model, alpha, beta)
+        if order == 1
+        else alpha_beta_gamma(model, alpha, beta, beta**2 / alpha)
+    )
     y = simulate(model, 1, 30, seed=8).y
     found = run(one, y).mean[:, 0]
     for k in range(order, 30):
@@ -104,7 +120,12 @@ def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
 
 
 def test_it_can_be_built_for_a_model_written_by_hand():
-    model = Model.define(["r + T*s + v", "s + w"], "r + n", {"T": 0.5}, symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]})
+    model = Model.define(
+        ["r + T*s + v", "s + w"],
+        "r + n",
+        {"T": 0.5},
+        symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]},
+    )
     one = alpha_beta(model, 0.3, 0.1)
     start = one.init(2)
     assert isinstance(start.posterior, Gaussian)
@@ -122,7 +143,11 @@ def test_other_models_are_refused():
         Model.define("x + v", "x + w"),
         Model.define(["x1 - x2", "x2 + v1"], "x1 + w1"),
     ):
-        with pytest.raises(ModelError, match=r"not position, velocity on each axis.*build it with kinematic\(interval, order=1,"):
+        with pytest.raises(
+            ModelError,
+            match=r"not position, velocity on each axis.*build it with kinematic\(interval, "
+            r"order=1,",
+        ):
             alpha_beta(model, 0.3, 0.1)
     with pytest.raises(ModelError, match=r"velocity and acceleration on each axis.*order=2,"):
         alpha_beta_gamma(kinematic(T, order=1), 0.5, 0.3, 0.1)
@@ -133,7 +158,9 @@ def test_other_models_are_refused():
         alpha_beta(Model.define(["x1 + x2", "x2 + v1"], "x1**2 + w1"), 0.3, 0.1)
 
 
-@pytest.mark.parametrize("coefficients", [(0.3, 0.0), (0.3, 3.5), (-0.1, 0.01), (2.5, 0.1), (np.nan, 0.1)])
+@pytest.mark.parametrize(
+    "coefficients", [(0.3, 0.0), (0.3, 3.5), (-0.1, 0.01), (2.5, 0.1), (np.nan, 0.1)]
+)
 def test_coefficients_whose_errors_grow_are_refused(coefficients):
     with pytest.raises(ValueError, match="is unstable"):
         alpha_beta(planar(), *coefficients)

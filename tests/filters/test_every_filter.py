@@ -1,5 +1,6 @@
-"""What holds for every filter: on a linear model the Kalman filter, no correction without a measurement, one trajectory is an
-ensemble of one, a state is never changed, no NaN, the same seed the same bytes, other units the same estimate."""
+"""What holds for every filter: on a linear model the Kalman filter, no correction without a
+measurement, one trajectory is an ensemble of one, a state is never changed, no NaN, the same seed
+the same bytes, other units the same estimate."""
 
 import pickle
 from functools import cache, partial
@@ -10,7 +11,18 @@ import oracles
 import pytest
 import sympy as sp
 
-from kfcourse import Model, design, gauss_hermite, gaussian, likelihood, linearised, run, simulate, smooth, unscented
+from kfcourse import (
+    Model,
+    design,
+    gauss_hermite,
+    gaussian,
+    likelihood,
+    linearised,
+    run,
+    simulate,
+    smooth,
+    unscented,
+)
 from kfcourse.filters import (
     EQUATIONS,
     adaptive,
@@ -76,25 +88,37 @@ OF_MEASUREMENTS = (fkp, mfkp, dfkp, mdfkp)
 def designs(structure, memory):
     """All filters with coefficients; `memory` steps for those that remember measurements."""
     found = [family(structure, arguments) for family in (fos, mfos) for arguments in (2, 3)]
-    return [*found, dfmp(structure), mdfmp(structure), fbp(structure, 3), *(of(structure, memory) for of in OF_MEASUREMENTS)]
+    return [
+        *found,
+        dfmp(structure),
+        mdfmp(structure),
+        fbp(structure, 3),
+        *(of(structure, memory) for of in OF_MEASUREMENTS),
+    ]
 
 
 @cache
 def every(name):
-    """Measurements (STEPS, 8, p) of a shipped variant, all its filters, designed on 300 trajectories, and the slow ones."""
+    """Measurements (STEPS, 8, p) of a shipped variant, all its filters, designed on 300
+    trajectories, and the slow ones."""
     model = find_variant(name).model
     x, y = simulate(model, 300, STEPS + 1, seed=1)
     ensemble = [Instant(x[k], y[k], x[k + 1]) for k in range(STEPS)]
     designed = design([duof(model), *designs(gaussian(model), 2)], ensemble)
     slow = [particle(model, 100), *([pointmass(model)] if model.n == model.p == 1 else [])]
-    return simulate(model, 8, STEPS, seed=2).y, [build(model) for build in READY.values()] + designed, slow
+    return (
+        simulate(model, 8, STEPS, seed=2).y,
+        [build(model) for build in READY.values()] + designed,
+        slow,
+    )
 
 
 # ---------------------------------------------------------------- linear models
 
 
 class Linear(SimpleNamespace):
-    """x' = A x + B v + a, y = H x + C w + b with laws of x_0, v, w: matrices, and the model built from strings."""
+    """x' = A x + B v + a, y = H x + C w + b with laws of x_0, v, w: matrices, and the model built
+    from strings."""
 
     def at(self, k: int):
         return self.A, self.B, self.a, self.H, self.C, self.b
@@ -113,9 +137,14 @@ class Linear(SimpleNamespace):
                 for row, more, c in zip(matrix, other, constant, strict=True)
             ]
 
-        state, meter = rows(self.A, "x", self.B, "v", self.a), rows(self.H, "x", self.C, "w", self.b)
+        state, meter = (
+            rows(self.A, "x", self.B, "v", self.a),
+            rows(self.H, "x", self.C, "w", self.b),
+        )
         laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
-        return Model.define(state if len(state) > 1 else state[0], meter if len(meter) > 1 else meter[0], **laws)
+        return Model.define(
+            state if len(state) > 1 else state[0], meter if len(meter) > 1 else meter[0], **laws
+        )
 
 
 def linear(n: int, p: int, v: int, w: int, seed: int) -> Linear:
@@ -132,7 +161,15 @@ def linear(n: int, p: int, v: int, w: int, seed: int) -> Linear:
     A = matrix(n, n)
     A = np.round(0.9 * A / max(abs(np.linalg.eigvals(A))), 2)
     laws = {"prior": law(n), "state_noise": law(v), "meter_noise": law(w)}
-    return Linear(A=A, B=matrix(n, v), a=matrix(1, n)[0], H=matrix(p, n), C=matrix(p, w), b=matrix(1, p)[0], laws=laws)
+    return Linear(
+        A=A,
+        B=matrix(n, v),
+        a=matrix(1, n)[0],
+        H=matrix(p, n),
+        C=matrix(p, w),
+        b=matrix(1, p)[0],
+        laws=laws,
+    )
 
 
 LINEAR = {
@@ -150,8 +187,9 @@ LINEAR = {
 def exact_ensemble(one: Linear | oracles.Changing, steps: int, seed: int) -> list[Instant]:
     """Trajectories whose sample moments are exactly the model's.
 
-    A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled, has sample
-    mean 0 and sample covariance I to rounding; the trajectories are affine functions of its columns.
+    A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled,
+    has sample mean 0 and sample covariance I to rounding; the trajectories are affine functions of
+    its columns.
     """
     sizes = {key: len(mean) for key, (mean, _) in one.laws.items()}
     columns = sizes["prior"] + steps * (sizes["state_noise"] + sizes["meter_noise"])
@@ -177,39 +215,53 @@ def exact_ensemble(one: Linear | oracles.Changing, steps: int, seed: int) -> lis
 def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
     """Every filter equals the Kalman filter when the model is linear and Gaussian.
 
-    AOF: the structural functions of a linear model are exact whatever the approximation, and the posterior
-    is Gaussian, so its mean and covariance are the exact ones.  DUOF, FOS, MFOS: their estimates are affine
-    in the noises, so all that the design takes from the ensemble is means and covariances of affine functions
-    of the noises; in `exact_ensemble` these are the model's.  Pugachev's corrections find the Kalman
-    gain because nothing affine in the innovation does better, and the FOS's condition finds Cov(x, z) = Cov(z)
-    (the error is orthogonal to the estimate), so Gamma is the identity on all values that z takes,
-    u = z and T = p.  Where Cov(z), Cov(sigma) or Cov(y, z) is singular (fewer measurements than components; z_0
-    an affine function of y_0), the pseudo-inverse acts on the values that occur, and estimates are unchanged.
+    AOF: the structural functions of a linear model are exact whatever the approximation, and the
+    posterior is Gaussian, so its mean and covariance are the exact ones.  DUOF, FOS, MFOS: their
+    estimates are affine in the noises, so all that the design takes from the ensemble is means and
+    covariances of affine functions of the noises; in `exact_ensemble` these are the model's.
+    Pugachev's corrections find the Kalman gain because nothing affine in the innovation does
+    better, and the FOS's condition finds Cov(x, z) = Cov(z) (the error is orthogonal to the
+    estimate), so Gamma is the identity on all values that z takes, u = z and T = p.  Where Cov(z),
+    Cov(sigma) or Cov(y, z) is singular (fewer measurements than components; z_0 an affine function
+    of y_0), the pseudo-inverse acts on the values that occur, and estimates are unchanged.
 
-    Tolerance: rounding (1e-16) times the condition of the regressions (the least non-zero eigenvalue of the
-    correlations of (y, z) is above 1e-7 here), and each of the six steps carries the error of the one before.
+    Tolerance: rounding (1e-16) times the condition of the regressions (the least non-zero
+    eigenvalue of the correlations of (y, z) is above 1e-7 here), and each of the six steps carries
+    the error of the one before.
     """
     model, moments = LINEAR[name].model(), exact_ensemble(LINEAR[name], STEPS, seed=3)
     kinds = [linearised(model), gaussian(model)]
-    designed = [duof(model), *(one for structure in kinds for one in designs(structure, STEPS))]  # all that there are
-    assert {one.name.rstrip("0123456789").partition("-")[0].rstrip("0123456789") for one in designed} == {*EQUATIONS} - {"aof"}
+    # all that there are
+    designed = [duof(model), *(one for structure in kinds for one in designs(structure, STEPS))]
+    assert {
+        one.name.rstrip("0123456789").partition("-")[0].rstrip("0123456789") for one in designed
+    } == {*EQUATIONS} - {"aof"}
     y = simulate(model, 5, STEPS, seed=8).y  # new trajectories, not those of the design
     expected = run(kalman_filter(model), y)
     checked = [(build(model), 1e-10) for build in NEUTRAL.values()]
     checked += [(one, 1e-9) for one in design(designed, moments)]
     for filter_, tolerance in checked:
         found = run(filter_, y)
-        np.testing.assert_allclose(found.mean, expected.mean, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
-        np.testing.assert_allclose(found.cov, expected.cov, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
+        np.testing.assert_allclose(
+            found.mean, expected.mean, rtol=tolerance, atol=tolerance, err_msg=filter_.name
+        )
+        np.testing.assert_allclose(
+            found.cov, expected.cov, rtol=tolerance, atol=tolerance, err_msg=filter_.name
+        )
 
 
-@pytest.mark.parametrize("kind", ["kalman", *(kind for kind in NEUTRAL if kind != "gated")])  # a gate refuses 80 after 100
+# a gate refuses 80 after 100
+@pytest.mark.parametrize("kind", ["kalman", *(kind for kind in NEUTRAL if kind != "gated")])
 @pytest.mark.parametrize(("variance", "r"), [(1e8, 1.0), (1e4, 1e-4), (1e14, 1.0)])
 def test_two_components_of_one_quantity_share_their_information(kind, variance, r):
-    """x' = x, y = (x + w1, x + w2) from a wide prior: means of all measurements, variances r / 2, r / 4, r / 6."""
+    """x' = x, y = (x + w1, x + w2) from a wide prior: means of all measurements, variances r / 2, r
+    / 4, r / 6."""
     prior, noise = {"mean": 0, "variance": variance}, {"variance": [[r, 0], [0, r]]}
     model = Model.define("x + 0*v", ["x + w1", "x + w2"], prior=prior, meter_noise=noise)
-    found = run((NEUTRAL | {"kalman": kalman_filter})[kind](model), np.array([[100.3, 99.2], [80, 80], [80, 80]])[:, None])
+    found = run(
+        (NEUTRAL | {"kalman": kalman_filter})[kind](model),
+        np.array([[100.3, 99.2], [80, 80], [80, 80]])[:, None],
+    )
     # the prior's weight r / variance, and the rounding of variance + r, squared in the variance
     np.testing.assert_allclose(found.cov.ravel() / r, [1 / 2, 1 / 4, 1 / 6], rtol=1e-3)
     np.testing.assert_allclose(found.mean.ravel(), [99.75, 89.875, 259.75 / 3], rtol=1e-3)
@@ -228,28 +280,46 @@ def test_a_missing_measurement_is_no_correction_and_the_others_do_not_notice(nam
         for k in range(STEPS):
             predicted = holed.predicted
             state, holed = filter_.step(state, y[k]), filter_.step(holed, gaps[k])
-            if k <= 3 or filter_ in quick:  # resampled particles are others where one record is another
+            # resampled particles are others where one record is another
+            if k <= 3 or filter_ in quick:
                 np.testing.assert_allclose(
-                    holed.posterior.mean[others], state.posterior.mean[others], rtol=1e-12, atol=1e-300, err_msg=filter_.name
+                    holed.posterior.mean[others],
+                    state.posterior.mean[others],
+                    rtol=1e-12,
+                    atol=1e-300,
+                    err_msg=filter_.name,
                 )
             if k == 3:
-                sd = np.sqrt(np.diagonal(np.broadcast_to(predicted.cov, (8, *predicted.cov.shape[-2:]))[4]))
-                # 100 particles move with a noise drawn anew; masses on nodes are summed in another order
-                allowed = {"particle": 6 * sd / 10, "aof-exact": 1e-4 * sd}.get(filter_.name, 1e-9 * sd)
-                assert (np.abs(holed.posterior.mean[4] - predicted.mean[4]) <= allowed).all(), filter_.name
+                sd = np.sqrt(
+                    np.diagonal(np.broadcast_to(predicted.cov, (8, *predicted.cov.shape[-2:]))[4])
+                )
+                # 100 particles move with a noise drawn anew; masses on nodes are summed in another
+                # order
+                allowed = {"particle": 6 * sd / 10, "aof-exact": 1e-4 * sd}.get(
+                    filter_.name, 1e-9 * sd
+                )
+                assert (np.abs(holed.posterior.mean[4] - predicted.mean[4]) <= allowed).all(), (
+                    filter_.name
+                )
         assert np.isfinite(holed.posterior.mean).all(), filter_.name
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_with_one_component_missing_the_other_counts(kind):
-    state, meter = ["x1 + 0.1*x2 + 0.1*v1", "x2 - 0.1*x1**3 + 0.2*v2"], ["x1**2 + x2 + 0.3*w1", "x1 + x1*x2/2 + 0.2*w2"]
+    state, meter = (
+        ["x1 + 0.1*x2 + 0.1*v1", "x2 - 0.1*x1**3 + 0.2*v2"],
+        ["x1**2 + x2 + 0.3*w1", "x1 + x1*x2/2 + 0.2*w2"],
+    )
     both = Model.define(state, meter)
     alone = Model.define(state, [meter[1]], symbols={"w": ["w1", "w2"]})
     y = simulate(both, 6, 5, seed=12).y
     holed = y.copy()
     holed[:, :, 0] = np.nan
     for of in (aof, iterated, robust):
-        found, expected = run(of(STRUCTURES[kind](both)), holed), run(of(STRUCTURES[kind](alone)), y[..., 1:])
+        found, expected = (
+            run(of(STRUCTURES[kind](both)), holed),
+            run(of(STRUCTURES[kind](alone)), y[..., 1:]),
+        )
         np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, atol=1e-10)
 
@@ -260,7 +330,9 @@ def test_one_trajectory_is_an_ensemble_of_one(name):
     for filter_ in [*quick, *slow[1:]]:  # not particles: each ensemble has its own
         found, alone = run(filter_, y), run(filter_, y[:, 5:6])
         for many, single in zip(found, alone, strict=True):
-            np.testing.assert_allclose(many[:, 5], single[:, 0], rtol=1e-9, atol=1e-300, err_msg=filter_.name)
+            np.testing.assert_allclose(
+                many[:, 5], single[:, 0], rtol=1e-9, atol=1e-300, err_msg=filter_.name
+            )
 
 
 @pytest.mark.parametrize("name", ["53", "20"])
@@ -271,7 +343,9 @@ def test_a_step_changes_no_state_and_gives_the_same_bytes_again(name):
         before = pickle.dumps(state)
         first, second = filter_.step(state, y[1]), filter_.step(state, y[1])
         assert pickle.dumps(state) == before, filter_.name
-        assert [law.mean.tobytes() for law in first[1:3]] == [law.mean.tobytes() for law in second[1:3]], filter_.name
+        assert [law.mean.tobytes() for law in first[1:3]] == [
+            law.mean.tobytes() for law in second[1:3]
+        ], filter_.name
         assert (state.step, first.step) == (1, 2), filter_.name
         assert filter_.slow == (filter_.name == "particle"), filter_.name
 
@@ -288,20 +362,29 @@ def test_no_measurement_makes_nan(name, value):
 def test_the_same_seed_gives_the_same_bytes():
     model = find_variant("53").model
     x, y = simulate(model, 200, 3, seed=1)
-    again = [design([duof(model), mfos(gaussian(model))], [Instant(x[0], y[0], x[1])]) for _ in range(2)]
+    again = [
+        design([duof(model), mfos(gaussian(model))], [Instant(x[0], y[0], x[1])]) for _ in range(2)
+    ]
     for left, right in zip(*again, strict=True):
         assert run(left, y[:1]).mean.tobytes() == run(right, y[:1]).mean.tobytes()
-    left, right, other = (run(particle(model, 40, seed), y[:, :3]).mean.tobytes() for seed in (1, 1, 2))
+    left, right, other = (
+        run(particle(model, 40, seed), y[:, :3]).mean.tobytes() for seed in (1, 1, 2)
+    )
     assert left == right != other
 
 
-@pytest.mark.parametrize("build", [*(partial(f, memory=2) for f in OF_MEASUREMENTS), aof, iterated, robust, adaptive, fos, dfmp])
+@pytest.mark.parametrize(
+    "build",
+    [*(partial(f, memory=2) for f in OF_MEASUREMENTS), aof, iterated, robust, adaptive, fos, dfmp],
+)
 def test_a_model_in_the_place_of_structural_functions_is_told(build):
     with pytest.raises(TypeError, match="expects a Structure, got Model"):
         build(find_variant("53").model)
 
 
-@pytest.mark.parametrize("build", [kalman_filter, duof, particle, pointmass, linearised, gaussian, unscented])
+@pytest.mark.parametrize(
+    "build", [kalman_filter, duof, particle, pointmass, linearised, gaussian, unscented]
+)
 def test_structural_functions_in_the_place_of_a_model_are_told(build):
     with pytest.raises(TypeError, match="expects a Model, got Structure"):
         build(linearised(find_variant("53").model))
@@ -310,16 +393,40 @@ def test_structural_functions_in_the_place_of_a_model_are_told(build):
 SCALAR = linearised(Model.define("0.9*x + v", "x + w"))
 AXIS = kinematic(1.0, dimensions=1, noise_sd=0.1)
 NUMBERS = {  # what is called, with what: what the message says
-    **{f"gate {p}": (lambda p=p: gated(aof(SCALAR), p), "probability must lie between") for p in (0, 1, 1.5, float("nan"))},
-    **{f"patience {n!r}": (lambda n=n: gated(aof(SCALAR), patience=n), "patience must be a whole") for n in (0, 2.0, True, "3")},
-    **{f"degrees {d}": (lambda d=d: robust(SCALAR, degrees=d), "degrees must be positive") for d in (0, -1, float("nan"))},
-    **{f"edge {c}": (lambda c=c: robust(SCALAR, edge=c), "edge must be positive") for c in (0, -1.0, float("nan"))},
-    **{f"rounds {n}": (lambda n=n: robust(SCALAR, rounds=n), "rounds must be a whole number") for n in (0, 1.5, True)},
-    **{f"window {w}": (lambda w=w: adaptive(SCALAR, window=w), "window must be more than one") for w in (1, 0, float("nan"))},
+    **{
+        f"gate {p}": (lambda p=p: gated(aof(SCALAR), p), "probability must lie between")
+        for p in (0, 1, 1.5, float("nan"))
+    },
+    **{
+        f"patience {n!r}": (lambda n=n: gated(aof(SCALAR), patience=n), "patience must be a whole")
+        for n in (0, 2.0, True, "3")
+    },
+    **{
+        f"degrees {d}": (lambda d=d: robust(SCALAR, degrees=d), "degrees must be positive")
+        for d in (0, -1, float("nan"))
+    },
+    **{
+        f"edge {c}": (lambda c=c: robust(SCALAR, edge=c), "edge must be positive")
+        for c in (0, -1.0, float("nan"))
+    },
+    **{
+        f"rounds {n}": (lambda n=n: robust(SCALAR, rounds=n), "rounds must be a whole number")
+        for n in (0, 1.5, True)
+    },
+    **{
+        f"window {w}": (lambda w=w: adaptive(SCALAR, window=w), "window must be more than one")
+        for w in (1, 0, float("nan"))
+    },
     "start": (lambda: alpha_beta(AXIS, 0.5, 0.2, start="here"), "start must be"),
     "gains": (lambda: alpha_beta(AXIS, 0.5, 0.2, gains="shrinking"), "gains must be"),
-    "gains and start": (lambda: alpha_beta(AXIS, 0.5, 0.2, start="prior", gains="growing"), "gains must be"),
-    **{f"alpha {a}": (lambda a=a: steady_beta(a), "lies between 0 and 1") for a in (0.0, 1.0, -0.1, np.nan)},
+    "gains and start": (
+        lambda: alpha_beta(AXIS, 0.5, 0.2, start="prior", gains="growing"),
+        "gains must be",
+    ),
+    **{
+        f"alpha {a}": (lambda a=a: steady_beta(a), "lies between 0 and 1")
+        for a in (0.0, 1.0, -0.1, np.nan)
+    },
 }
 
 
@@ -334,7 +441,8 @@ def test_numbers_that_are_none_are_refused(case):
 
 # Old units in new ones.  They are powers of two: each number then rounds as before.
 OF_STATE, OF_METER = np.array([2.0**20, 2.0**-30]), np.array([2.0**-11, -(2.0**16)])
-ROUNDING = 1e-9  # in standard deviations, and of ln p: SymPy may order the terms of a formula otherwise
+# in standard deviations, and of ln p: SymPy may order the terms of a formula otherwise
+ROUNDING = 1e-9
 
 
 def in_units(model: Model) -> Model:
@@ -372,7 +480,9 @@ def test_filters_smoothers_and_likelihoods_are_the_same_in_other_units(name):
     other, y = in_units(model), simulate(model, 20, 8, seed=1).y.copy()
     y[3, ::3] = np.nan
     seen, log_of_units = OF_METER[: model.p] * y, np.log(np.abs(OF_METER[: model.p])).sum()
-    exact = {"pointmass": lambda one: pointmass(one, accuracy=1e-6)} if model.n == model.p == 1 else {}
+    exact = (
+        {"pointmass": lambda one: pointmass(one, accuracy=1e-6)} if model.n == model.p == 1 else {}
+    )
     smoothed = [*STRUCTURES, "iterated", "robust", "gated", "adaptive", *exact]
     for kind, build in {**READY, **exact}.items():
         assert_same(run(build(other), seen), run(build(model), y))
@@ -386,10 +496,17 @@ def test_filters_smoothers_and_likelihoods_are_the_same_in_other_units(name):
 def test_designs_from_the_same_trajectories_are_the_same_in_other_units(name):
     model, steps = find_variant(name).model, 5
     other, s, t = in_units(model), OF_STATE, OF_METER
-    families = [duof, *(lambda one, of=of: of(gaussian(one)) for of in (fos, mfos, partial(fkp, memory=2)))]
+    families = [
+        duof,
+        *(lambda one, of=of: of(gaussian(one)) for of in (fos, mfos, partial(fkp, memory=2))),
+    ]
     x, y = simulate(model, 400, steps + 1, seed=2)
     z, u = s[: model.n] * x, t[: model.p] * y
-    here = design([of(model) for of in families], (Instant(x[k], y[k], x[k + 1]) for k in range(steps)))
-    there = design([of(other) for of in families], (Instant(z[k], u[k], z[k + 1]) for k in range(steps)))
+    here = design(
+        [of(model) for of in families], (Instant(x[k], y[k], x[k + 1]) for k in range(steps))
+    )
+    there = design(
+        [of(other) for of in families], (Instant(z[k], u[k], z[k + 1]) for k in range(steps))
+    )
     for one, another in zip(here, there, strict=True):
         assert_same(run(another, u[:steps, :50]), run(one, y[:steps, :50]))

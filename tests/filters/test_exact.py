@@ -1,4 +1,5 @@
-"""The exact AOF against the Kalman filter, against closed forms, and against plain fine grids written here."""
+"""The exact AOF against the Kalman filter, against closed forms, and against plain fine grids
+written here."""
 
 from functools import partial
 
@@ -19,23 +20,28 @@ from kfcourse.symbolic.structure import gaussian
 ACCURACY = 1e-6
 pointmass = partial(filters.pointmass, accuracy=ACCURACY)
 
-# What the accuracy does not rule, in deviations: kernels widened to 1 % of a panel, which is up to seven
-# deviations long, err by the fourth power of that, 2e-5, and its fourth derivative, an eighth.
+# What the accuracy does not rule, in deviations: kernels widened to 1 % of a panel, which is up to
+# seven deviations long, err by the fourth power of that, 2e-5, and its fourth derivative, an
+# eighth.
 FLOOR = 1e-5
 
 
 def followed(model, y, accuracy=ACCURACY):
-    """Means, deviations and stated errors in deviations, (steps, runs), along y (steps, runs, 1)."""
+    """Means, deviations and stated errors in deviations, (steps, runs), along y (steps, runs,
+    1)."""
     exact = filters.pointmass(model, accuracy)
     state, found = exact.init(y.shape[1]), []
     for measurement in y:
         state = exact.step(state, measurement)
-        found.append((state.posterior.mean[:, 0], np.sqrt(state.posterior.cov[:, 0, 0]), state.memory.error))
+        found.append(
+            (state.posterior.mean[:, 0], np.sqrt(state.posterior.cov[:, 0, 0]), state.memory.error)
+        )
     return tuple(np.array(values) for values in zip(*found, strict=True))
 
 
 def agrees(found, mean, sd, allowed=FLOOR, times=1.0):
-    """Whether means and deviations err by no more than so many times what is stated, and is allowed."""
+    """Whether means and deviations err by no more than so many times what is stated, and is
+    allowed."""
     ours, deviation, stated = found
     off = np.maximum(np.abs(ours - mean) / sd, np.abs(deviation / sd - 1))
     assert (off <= times * stated + allowed).all(), (off / stated).max()
@@ -52,7 +58,8 @@ def variants():
 
 @pytest.fixture(scope="module", params=[0.02, 0.2], ids=["f=0.02", "f=0.2"])
 def followed53(request, variants):
-    """Variant 53, the lab's meter and one ten times worse: true states, and what the filter found."""
+    """Variant 53, the lab's meter and one ten times worse: true states, and what the filter
+    found."""
     model = variants["53"].replace(f=request.param)
     x, y = simulate(model, 250, 12, 3)
     return x[:, :, 0], followed(model, y)
@@ -86,8 +93,12 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior)
             allowed = a.memory.error + FLOOR
             assert (np.abs(a.posterior.mean - b.posterior.mean)[:, 0] <= allowed * sd).all(), k
             assert (np.abs(np.sqrt(a.posterior.cov[:, 0, 0]) / sd - 1) <= allowed).all(), k
-        assert (np.abs(a.predicted.mean - b.predicted.mean)[:, 0] <= (a.memory.error + FLOOR) * sd_ahead).all(), k
-        assert (np.abs(np.sqrt(a.predicted.cov[:, 0, 0]) / sd_ahead - 1) <= a.memory.error + FLOOR).all(), k
+        assert (
+            np.abs(a.predicted.mean - b.predicted.mean)[:, 0] <= (a.memory.error + FLOOR) * sd_ahead
+        ).all(), k
+        assert (
+            np.abs(np.sqrt(a.predicted.cov[:, 0, 0]) / sd_ahead - 1) <= a.memory.error + FLOOR
+        ).all(), k
         total = a.memory.error.max()
     assert total < 1e-3
 
@@ -96,9 +107,11 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior)
 
 
 def on_a_uniform_grid(y, a, q, b, r, mean, variance, half_width, nodes=2001):
-    """The Stratonovich equation with rectangles: a(x), b(x) and sigmas q, r(x) of both noises; means and sigmas (steps,).
+    """The Stratonovich equation with rectangles: a(x), b(x) and sigmas q, r(x) of both noises;
+    means and sigmas (steps,).
 
-    The narrowest density here spans more than ten nodes per sigma: rectangles then err by exp(-2 pi^2 10^2), that is not at all.
+    The narrowest density here spans more than ten nodes per sigma: rectangles then err by exp(-2
+    pi^2 10^2), that is not at all.
     """
     x = np.linspace(-half_width, half_width, nodes)
     kernel = normal(x[:, None], a(x), q)
@@ -124,7 +137,9 @@ DENSE = {
 def test_it_equals_a_dense_uniform_grid(variants, name, accuracy):
     a, q, b, r, variance, half_width = DENSE[name]
     _, y = simulate(variants[name], 5, 10, seed=8)
-    expected = [on_a_uniform_grid(y[:, i, 0], a, q, b, r, 0.0, variance, half_width) for i in range(5)]
+    expected = [
+        on_a_uniform_grid(y[:, i, 0], a, q, b, r, 0.0, variance, half_width) for i in range(5)
+    ]
     agrees(followed(variants[name], y, accuracy), *np.moveaxis(expected, 0, -1))
 
 
@@ -135,7 +150,11 @@ def test_on_variant_53_the_first_posterior_is_prior_times_likelihood(variants, f
 
     def density(x):
         x = mpmath.mpf(x)
-        return mpmath.exp(-x * x / 2 - ((y - x) / (f * x * x)) ** 2 / 2) / (x * x) if x else mpmath.mpf(0)
+        return (
+            mpmath.exp(-x * x / 2 - ((y - x) / (f * x * x)) ** 2 / 2) / (x * x)
+            if x
+            else mpmath.mpf(0)
+        )
 
     steps = [width * 2.0**j for j in range(-2, 40) if width * 2.0**j < 40]
     points = sorted({-40.0, 0.0, y, 40.0, *(y + s for s in steps), *(y - s for s in steps)})
@@ -143,11 +162,16 @@ def test_on_variant_53_the_first_posterior_is_prior_times_likelihood(variants, f
         total = mpmath.quad(density, points)
         expected = mpmath.quad(lambda x: x * density(x), points) / total
         variance = mpmath.quad(lambda x: (x - expected) ** 2 * density(x), points) / total
-    agrees(followed(variants["53"].replace(f=f), np.array([[[y]]])), float(expected), float(variance) ** 0.5)
+    agrees(
+        followed(variants["53"].replace(f=f), np.array([[[y]]])),
+        float(expected),
+        float(variance) ** 0.5,
+    )
 
 
 def test_on_variant_53_it_equals_a_grid_that_moves_with_the_measurement(variants):
-    # Away from 0 the posterior lies within a few f y^2 of y: 2001 nodes over 15 of them, rectangles as above.
+    # Away from 0 the posterior lies within a few f y^2 of y: 2001 nodes over 15 of them, rectangles
+    # as above.
     c, e, f = 0.9, 0.05, 0.02
     rng = np.random.default_rng(2)
     x, y, expected = 1.5, [], []
@@ -157,7 +181,11 @@ def test_on_variant_53_it_equals_a_grid_that_moves_with_the_measurement(variants
     before, masses = None, None
     for value in y:
         x = value + np.linspace(-15, 15, 2001) * f * value * value
-        predicted = normal(x, 0, 1) if before is None else normal(x[:, None], c * before, e * np.abs(before)) @ masses
+        predicted = (
+            normal(x, 0, 1)
+            if before is None
+            else normal(x[:, None], c * before, e * np.abs(before)) @ masses
+        )
         masses = predicted * normal(value, x, f * x * x)
         masses /= masses.sum()
         before, centre = x, masses @ x
@@ -166,10 +194,11 @@ def test_on_variant_53_it_equals_a_grid_that_moves_with_the_measurement(variants
 
 
 def test_panels_are_split_where_no_state_explains_the_measurement():
-    """y = x^2 + 0.001 w came out at -0.0005: no zero of y - x^2 leads to the posterior, 70 times narrower than a panel.
+    """y = x^2 + 0.001 w came out at -0.0005: no zero of y - x^2 leads to the posterior, 70 times
+    narrower than a panel.
 
-    Prior times likelihood by the trapezium rule, which for a smooth density that vanishes at the ends converges faster than
-    any power of the step; here 0.02 wide, with steps of 1e-5.
+    Prior times likelihood by the trapezium rule, which for a smooth density that vanishes at the
+    ends converges faster than any power of the step; here 0.02 wide, with steps of 1e-5.
     """
     model = Model.define("x + v", "x**2 + 0.001*w", prior={"mean": 0.3})
     x = np.linspace(-0.3, 0.3, 60_001)
@@ -192,7 +221,8 @@ def test_panels_are_split_where_no_state_explains_the_measurement():
     ],
 )
 def test_a_prediction_has_the_moments_of_the_closed_form(state, mean, variance):
-    """The density of the next state, not only the moments: the second state without a measurement is drawn from it."""
+    """The density of the next state, not only the moments: the second state without a measurement
+    is drawn from it."""
     exact, nothing = pointmass(Model.define(state, "x + w")), np.full((1, 1), np.nan)
     first = exact.step(exact.init(1), nothing)
     second = exact.step(first, nothing)
@@ -203,11 +233,15 @@ def test_a_prediction_has_the_moments_of_the_closed_form(state, mean, variance):
 
 @pytest.mark.parametrize(("c", "e"), [(1.05, 0.01), (1.0, 0.001)])
 def test_a_noise_that_vanishes_at_a_state_has_the_moments_of_the_closed_form(c, e):
-    """x' = c x + e x^2 v.  Without measurements M x' = 0, M x'^2 = c^2 M x^2 + e^2 M x^4, and of x_1 ~ c x + e x^2 v
+    """x' = c x + e x^2 v.  Without measurements M x' = 0, M x'^2 = c^2 M x^2 + e^2 M x^4, and of
+    x_1 ~ c x + e x^2 v
 
     M x_1^4 = c^4 M x^4 + 6 c^2 e^2 M x^6 + 3 e^4 M x^8, where M x^2, x^4, x^6, x^8 = 1, 3, 15, 105.
     """
-    exact, nothing = pointmass(Model.define("c*x + e*x**2*v", "x + w", {"c": c, "e": e})), np.full((1, 1), np.nan)
+    exact, nothing = (
+        pointmass(Model.define("c*x + e*x**2*v", "x + w", {"c": c, "e": e})),
+        np.full((1, 1), np.nan),
+    )
     first = exact.step(exact.init(1), nothing)
     second = exact.step(first, nothing)
     square = c**2 + 3 * e**2
@@ -215,13 +249,17 @@ def test_a_noise_that_vanishes_at_a_state_has_the_moments_of_the_closed_form(c, 
     np.testing.assert_allclose(first.predicted.cov[0, 0, 0], square, rtol=1e-6)
     np.testing.assert_allclose(second.posterior.cov[0, 0, 0], square, rtol=1e-5)
     # x^2 = 50 where the density has 1e-11 of its mass, which may be cut off
-    np.testing.assert_allclose(second.predicted.cov[0, 0, 0], c**2 * square + e**2 * fourth, rtol=1e-5)
+    np.testing.assert_allclose(
+        second.predicted.cov[0, 0, 0], c**2 * square + e**2 * fourth, rtol=1e-5
+    )
 
 
 def test_a_kernel_that_is_narrow_here_and_folds_there():
-    """x' = 0.9 x + 0.05 x^2 v: narrow near 0, and far out the noise turns f(., v) back.  Against a sum over a million states."""
+    """x' = 0.9 x + 0.05 x^2 v: narrow near 0, and far out the noise turns f(., v) back.  Against a
+    sum over a million states."""
     model = Model.define("0.9*x + 0.05*x**2*v", "x + 0.5*w")
-    # The second posterior's moments: x' = f(x, u), over x of the first posterior, N(0.32, 0.2), and u; trapezoidal in both.
+    # The second posterior's moments: x' = f(x, u), over x of the first posterior, N(0.32, 0.2), and
+    # u; trapezoidal in both.
     x = 0.32 + np.sqrt(0.2) * np.linspace(-9, 9, 2001)[:, None]
     u = np.linspace(-8, 8, 801)
     weight = np.exp(-0.5 * ((x - 0.32) ** 2 / 0.2 + u**2))
@@ -237,7 +275,8 @@ BEYOND = 40.0  # the states of the oracles below lie within
 
 
 def by_midpoints(y, prior, mean, deviation, meter=lambda x: x):
-    """Means and deviations of p(x_k | y_0..k), y = b(x) + w, by midpoints of cells none of which holds the jump at 0."""
+    """Means and deviations of p(x_k | y_0..k), y = b(x) + w, by midpoints of cells none of which
+    holds the jump at 0."""
     x = np.arange(-BEYOND, BEYOND, 0.02) + 0.01
     kernel = np.exp(-0.5 * ((x[:, None] - mean(x)) / deviation(x)) ** 2) / deviation(x)
     ahead = np.exp(-0.5 * (x - prior.mean) ** 2 / prior.cov[0, 0])[:, None]
@@ -259,7 +298,8 @@ def by_midpoints(y, prior, mean, deviation, meter=lambda x: x):
     ],
 )
 def test_panels_are_split_where_the_object_jumps(state, mean, deviation):
-    """A midpoint rule of cells 1/50 of the meter's deviation wide errs by some 1e-5; across a jump it would by 1e-2."""
+    """A midpoint rule of cells 1/50 of the meter's deviation wide errs by some 1e-5; across a jump
+    it would by 1e-2."""
     model = Model.define(state, "x + w", prior={"mean": 0.5, "variance": 2.0})
     _, y = simulate(model, 12, 5, seed=1)
     expected = np.array(list(by_midpoints(y, model.prior, mean, deviation)))
@@ -269,14 +309,20 @@ def test_panels_are_split_where_the_object_jumps(state, mean, deviation):
 def test_panels_are_split_where_the_meter_jumps():
     model = Model.define("0.9*x + v", "2*sign(x) + w")
     _, y = simulate(model, 12, 5, seed=1)
-    expected = np.array(list(by_midpoints(y, model.prior, lambda x: 0.9 * x, np.ones_like, lambda x: 2 * np.sign(x))))
+    expected = np.array(
+        list(
+            by_midpoints(y, model.prior, lambda x: 0.9 * x, np.ones_like, lambda x: 2 * np.sign(x))
+        )
+    )
     agrees(followed(model, y, 1e-3), *np.moveaxis(expected, 1, 0), allowed=1e-4)
 
 
 def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
-    """x' = x^(-1/3) + v with the odd root: few of x come to 20, from 1/8000.  Particles have none there.
+    """x' = x^(-1/3) + v with the odd root: few of x come to 20, from 1/8000.  Particles have none
+    there.
 
-    The oracle takes cells 1/500 of their distance from the pole: so many that their midpoints, at 20, are 1/75 apart.
+    The oracle takes cells 1/500 of their distance from the pole: so many that their midpoints, at
+    20, are 1/75 apart.
     """
     first, then = 0.5, np.array([20.0, -30.0, 1.0, 7.0])
     edge = np.geomspace(1e-6, 12.0, 8000)
@@ -286,7 +332,11 @@ def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
     expected = []
     for measured in then:
         there = measured + np.linspace(-8, 8, 161)
-        p = np.exp(-0.5 * (there[:, None] - 1 / np.cbrt(x)) ** 2) @ mass * np.exp(-0.5 * (measured - there) ** 2)
+        p = (
+            np.exp(-0.5 * (there[:, None] - 1 / np.cbrt(x)) ** 2)
+            @ mass
+            * np.exp(-0.5 * (measured - there) ** 2)
+        )
         p /= p.sum()
         expected.append((p @ there, np.sqrt(p @ (there - p @ there) ** 2)))
     found = followed(inverse_cube_root(), np.stack([np.full(4, first), then])[:, :, None], 1e-3)
@@ -315,7 +365,8 @@ def test_where_densities_are_rough_the_stated_error_holds(state, meter):
 
 
 def test_stochastic_volatility_is_what_many_particles_find():
-    """Twenty clouds of 10,000 particles that do not look at the measurement: within 4 of their standard errors."""
+    """Twenty clouds of 10,000 particles that do not look at the measurement: within 4 of their
+    standard errors."""
     model = Model.define("0.95*x + 0.3*v", "exp(x/2)*w")
     _, y = simulate(model, 2, 6, seed=4)
     expected = run(pointmass(model), y)
@@ -323,14 +374,21 @@ def test_stochastic_volatility_is_what_many_particles_find():
     for kind in ("mean", "cov"):
         values = np.stack([getattr(law, kind).reshape(6, 2) for law in found])
         error = values.std(axis=0, ddof=1) / np.sqrt(20)
-        assert (abs(values.mean(axis=0) - getattr(expected, kind).reshape(6, 2)) < 4 * error).all(), kind
+        assert (
+            abs(values.mean(axis=0) - getattr(expected, kind).reshape(6, 2)) < 4 * error
+        ).all(), kind
 
 
 def test_a_precision_with_a_chi_square_prior_has_a_gamma_posterior():
-    """y = w / x: p(x | y) = C |x| exp(-x^2 (1 + y^2) / 2), so that x^2 ~ Gamma(1, scale 2 / (1 + y^2)), and two humps."""
+    """y = w / x: p(x | y) = C |x| exp(-x^2 (1 + y^2) / 2), so that x^2 ~ Gamma(1, scale 2 / (1 +
+    y^2)), and two humps."""
     y = np.array([0.7, -1.2, 0.1, 2.0, 0.3])
     expected = [np.sqrt(stats.gamma(1, scale=2 / (1 + value**2)).mean()) for value in y]
-    agrees([part[0] for part in followed(Model.define("x + v", "w/x"), y[None, :, None], 1e-4)], 0.0, np.array(expected))
+    agrees(
+        [part[0] for part in followed(Model.define("x + v", "w/x"), y[None, :, None], 1e-4)],
+        0.0,
+        np.array(expected),
+    )
 
 
 # --- against itself
@@ -358,7 +416,9 @@ def test_what_it_states_is_far_finer_than_what_trajectories_could_see(followed53
 @pytest.mark.parametrize("name", ["53", "2", "5", "7", "10"])
 def test_no_filter_beats_it(variants, name):
     model = variants[name]
-    result = compare(lab_filters(model, [*LAB, "aof-exact"]), model, 200, 8, seed=6, design_runs=20_000)
+    result = compare(
+        lab_filters(model, [*LAB, "aof-exact"]), model, 200, 8, seed=6, design_runs=20_000
+    )
     for other in LAB:
         excess = result.difference(other, "aof-exact")
         assert (excess.value >= -4 * excess.standard_error).all(), other
@@ -376,8 +436,13 @@ def test_a_missing_measurement_is_a_prediction(variants):
             state = exact.step(state, measurement)
         after = exact.step(state, np.full((6, 1), np.nan))
         sd = np.sqrt(state.predicted.cov[:, 0, 0])
-        assert (np.abs(after.posterior.mean - state.predicted.mean)[:, 0] <= (after.memory.error + FLOOR) * sd).all()
-        assert (np.abs(np.sqrt(after.posterior.cov[:, 0, 0]) / sd - 1) <= after.memory.error + FLOOR).all()
+        assert (
+            np.abs(after.posterior.mean - state.predicted.mean)[:, 0]
+            <= (after.memory.error + FLOOR) * sd
+        ).all()
+        assert (
+            np.abs(np.sqrt(after.posterior.cov[:, 0, 0]) / sd - 1) <= after.memory.error + FLOOR
+        ).all()
         assert (after.memory.log_likelihood == 0).all()
 
 
@@ -393,7 +458,8 @@ def test_a_measurement_missing_in_one_trajectory_leaves_the_others(variants):
 @pytest.mark.parametrize("name", ["53", "1", "2", "5", "7", "10", "11", "12"])
 @pytest.mark.parametrize("value", [0.0, -0.0, 1e3, -1e3, 1e-12])
 def test_an_odd_measurement_is_followed_or_refused(variants, name, value):
-    """What is stated holds against a filter of a thousandth of the error, or there is a sentence."""
+    """What is stated holds against a filter of a thousandth of the error, or there is a
+    sentence."""
     _, y = simulate(variants[name], 2, 4, seed=1)
     y = y.copy()
     y[1] = value
@@ -408,7 +474,8 @@ def test_an_odd_measurement_is_followed_or_refused(variants, name, value):
 
 @pytest.mark.parametrize("y", [-1000.0, -100.0, -20.0, -6.0, -3.0, -1.0])
 def test_a_record_that_contradicts_the_model_has_the_right_answer_or_none(variants, y):
-    """Variant 11, x' = x + .1 (x - x^3) + .15 v, y = x + .5 w, after a first y of .9: a grid of logarithms cannot underflow."""
+    """Variant 11, x' = x + .1 (x - x^3) + .15 v, y = x + .5 w, after a first y of .9: a grid of
+    logarithms cannot underflow."""
     x = np.linspace(-12, 6, 3601)
     first = -0.5 * x**2 / 0.3 - 0.5 * ((0.9 - x) / 0.5) ** 2
     moved = first - 0.5 * ((x[:, None] - (x + 0.1 * (x - x**3))) / 0.15) ** 2
@@ -420,23 +487,32 @@ def test_a_record_that_contradicts_the_model_has_the_right_answer_or_none(varian
     try:
         found = [part[1] for part in followed(variants["11"], np.array([[[0.9]], [[y]]]), 1e-3)]
     except Unresolved as error:
-        assert y <= -6 and ("contradicts the model" in str(error) or "no state explains" in str(error))
+        assert y <= -6 and (
+            "contradicts the model" in str(error) or "no state explains" in str(error)
+        )
     else:
         agrees(found, p @ x, sd, allowed=1e-5)
         assert y >= -6
 
 
 def test_it_knows_where_a_linear_record_leaves_its_prediction():
-    """Measurements 4 to 11 deviations from where the state was predicted; the Kalman filter has the truth."""
+    """Measurements 4 to 11 deviations from where the state was predicted; the Kalman filter has the
+    truth."""
     model, refused = Model.define("x + 0.1*v", "x + 0.5*w"), []
     for level in np.arange(2.0, 12.0, 0.5):
         y = np.array([0.0, 0.0, *4 * [level]])[:, None, None]
         expected = run(kalman_filter(model), y)
         try:
-            agrees(followed(model, y, 1e-3), expected.mean[..., 0], np.sqrt(expected.cov[..., 0, 0]), times=3)
+            agrees(
+                followed(model, y, 1e-3),
+                expected.mean[..., 0],
+                np.sqrt(expected.cov[..., 0, 0]),
+                times=3,
+            )
         except Unresolved:
             refused.append(level)
-    assert refused and refused == list(np.arange(refused[0], 12.0, 0.5))  # beyond a level all, and none before
+    # beyond a level all, and none before
+    assert refused and refused == list(np.arange(refused[0], 12.0, 0.5))
     assert 3 <= refused[0] < 8
 
 
@@ -469,7 +545,9 @@ def test_a_vector_model_is_refused_with_advice(variants):
         pointmass(two)
 
 
-@pytest.mark.parametrize(("state", "meter"), [("x + v**2", "x + w"), ("x + v", "x + w**3"), ("x*exp(v)", "x + w")])
+@pytest.mark.parametrize(
+    ("state", "meter"), [("x + v**2", "x + w"), ("x + v", "x + w**3"), ("x*exp(v)", "x + w")]
+)
 def test_a_nonlinear_noise_is_refused_with_advice(state, meter):
     model = Model.define(state, meter)
     with pytest.raises(ModelError, match=r"noise enters nonlinearly.*gauss_hermite"):
@@ -494,7 +572,12 @@ def test_without_noise_there_is_no_density(state, meter, message):
 
 @pytest.mark.parametrize(
     ("state", "meter"),
-    [("1e18*v", "x + w"), ("0.9*x + 0.3*v", "sin(1000*x) + 0.01*w"), ("x**3 + 1e-6*v", "x + w"), ("1e5*x + 0.1*v", "x + w")],
+    [
+        ("1e18*v", "x + w"),
+        ("0.9*x + 0.3*v", "sin(1000*x) + 0.01*w"),
+        ("x**3 + 1e-6*v", "x + w"),
+        ("1e5*x + 0.1*v", "x + w"),
+    ],
 )
 def test_what_cannot_be_resolved_is_refused_in_words(state, meter):
     model = Model.define(state, meter)
@@ -535,10 +618,13 @@ def test_what_its_memory_shows_is_a_density(variants):
 
 
 def test_the_gaussian_aof_differs_where_the_posterior_is_not_gaussian(variants):
-    # A sine meter: the estimates are apart by more than the exact filter's own error, or nothing was tested here.
+    # A sine meter: the estimates are apart by more than the exact filter's own error, or nothing
+    # was tested here.
     _, y = simulate(variants["5"], 5, 5, seed=8)
     mean, sd, stated = followed(variants["5"], y)
-    assert (np.abs(run(aof(gaussian(variants["5"])), y).mean[..., 0] - mean) > stated * sd).mean() > 0.9
+    assert (
+        np.abs(run(aof(gaussian(variants["5"])), y).mean[..., 0] - mean) > stated * sd
+    ).mean() > 0.9
 
 
 # --- its parts
@@ -560,8 +646,12 @@ def test_the_points_of_a_panel_integrate_polynomials_of_degree_13():
 def test_the_last_coefficients_of_legendre_tell_how_a_panel_is_resolved():
     coefficients = np.arange(1.0, panels.Q + 1)
     values = np.polynomial.legendre.legval(panels.POINT, coefficients)
-    np.testing.assert_allclose([panels.LAST_BUT_ONE @ values, panels.LAST @ values], coefficients[-2:], rtol=1e-12)
-    np.testing.assert_allclose(np.polynomial.polynomial.polyval(panels.POINT, panels.POWER @ values), values, rtol=1e-12)
+    np.testing.assert_allclose(
+        [panels.LAST_BUT_ONE @ values, panels.LAST @ values], coefficients[-2:], rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        np.polynomial.polynomial.polyval(panels.POINT, panels.POWER @ values), values, rtol=1e-12
+    )
     np.testing.assert_allclose(panels.SLOPE @ panels.POINT**3, 3 * panels.POINT**2, atol=1e-12)
 
 
@@ -570,7 +660,9 @@ def test_the_law_of_an_angle_is_wound_around_the_circle(turn):
     z = np.linspace(-3, 3, 7)
     turns = turn * np.arange(-60, 61) if turn < np.inf else np.zeros(1)
     expected = -0.7 + np.log(np.exp(-0.5 * (z[:, None] + turns) ** 2).sum(axis=1))
-    np.testing.assert_allclose([panels.log_likelihood(value, -0.7, turn) for value in z], expected, atol=1e-12)
+    np.testing.assert_allclose(
+        [panels.log_likelihood(value, -0.7, turn) for value in z], expected, atol=1e-12
+    )
 
 
 def test_a_law_is_printed_once_for_all_numbers(variants):

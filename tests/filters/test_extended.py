@@ -1,4 +1,5 @@
-"""The extended Kalman filter against the slow loop of the page, and the angle of a point in formulas."""
+"""The extended Kalman filter against the slow loop of the page, and the angle of a point in
+formulas."""
 
 import math
 
@@ -14,12 +15,15 @@ from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import unscented
 from kfcourse.symbolic.structure import gaussian, linearised
 
-# A falling body with drag, gusts that grow with the speed, and a radar: range and elevation with correlated errors.
+# A falling body with drag, gusts that grow with the speed, and a radar: range and elevation with
+# correlated errors.
 T, DRAG, GRAVITY, GUST = 0.5, 5e-5, 9.81, 0.01
 D_XI = np.array([[1.0, 0.3], [0.3, 2.0]])
 D_N = np.array([[2500.0, 0.2], [0.2, 1e-4]])
 MEAN = np.array([14_000.0, 3_000.0, -350.0, 120.0])
-COV = np.array([[9e4, 1e4, 500, 0], [1e4, 8e4, 0, 300], [500, 0, 900, 100], [0, 300, 100, 800]], dtype=float)
+COV = np.array(
+    [[9e4, 1e4, 500, 0], [1e4, 8e4, 0, 300], [500, 0, 900, 100], [0, 300, 100, 800]], dtype=float
+)
 STEPS = 40
 
 
@@ -27,7 +31,12 @@ STEPS = 40
 def radar() -> Model:
     speed = "sqrt(vx**2 + vy**2)"
     return Model.define(
-        ["px + T*vx", "py + T*vy", f"vx - T*c*{speed}*vx + e*{speed}*xi1", f"vy - T*(c*{speed}*vy + g) + e*{speed}*xi2"],
+        [
+            "px + T*vx",
+            "py + T*vy",
+            f"vx - T*c*{speed}*vx + e*{speed}*xi1",
+            f"vy - T*(c*{speed}*vy + g) + e*{speed}*xi2",
+        ],
         ["sqrt(px**2 + py**2) + n1", "atan2(py, px) + n2"],
         {"T": T, "c": DRAG, "g": GRAVITY, "e": GUST},
         symbols={"x": ["px", "py", "vx", "vy"], "v": ["xi1", "xi2"], "w": ["n1", "n2"]},
@@ -49,7 +58,12 @@ def y(radar):
 def f(x):
     speed = np.hypot(x[2], x[3])
     return np.array(
-        [x[0] + T * x[2], x[1] + T * x[3], x[2] - T * DRAG * speed * x[2], x[3] - T * (DRAG * speed * x[3] + GRAVITY)]
+        [
+            x[0] + T * x[2],
+            x[1] + T * x[3],
+            x[2] - T * DRAG * speed * x[2],
+            x[3] - T * (DRAG * speed * x[3] + GRAVITY),
+        ]
     )
 
 
@@ -100,12 +114,15 @@ def slow(measurements, form):
 def assert_equal_to_rounding(mean, cov, expected_mean, expected_cov):
     """Apart by rounding only, in units of the standard deviations of the components.
 
-    eps = 2e-16, times the condition of the correlations (below 1e3 here), times the largest component in standard
-    deviations (below 1e3), for each of 40 steps: 1e-8.  Textbook forms without symmetrisation are within it too.
+    eps = 2e-16, times the condition of the correlations (below 1e3 here), times the largest
+    component in standard deviations (below 1e3), for each of 40 steps: 1e-8.  Textbook forms
+    without symmetrisation are within it too.
     """
     sd = np.sqrt(np.diagonal(expected_cov))
     np.testing.assert_allclose(mean / sd, expected_mean / sd, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(cov / np.outer(sd, sd), expected_cov / np.outer(sd, sd), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(
+        cov / np.outer(sd, sd), expected_cov / np.outer(sd, sd), rtol=0, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("form", [gain_form, information_form])

@@ -33,7 +33,8 @@ def test_the_kalman_filter_refuses_what_is_not_linear(variant53):
         kalman_filter(variant53)
 
 
-# ---------------------------------------------------------------- variant 53 against the page's loops
+# ---------------------------------------------------------------- variant 53 against the page's
+# loops
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,8 @@ def test_the_aof_is_the_loop_of_the_page(variant53, trajectories, kind):
     for i in range(y.shape[1]):
         expected = np.array(oracles.aof_trajectory(kind, y[:, i].tolist()))
         np.testing.assert_allclose(found.mean[:, i, 0], expected[:, 0], rtol=1e-12, atol=1e-15)
-        # The page's p = Psi - K G Psi loses digits where the meter is sharp: rounding of Psi beside p.
+        # The page's p = Psi - K G Psi loses digits where the meter is sharp: rounding of Psi beside
+        # p.
         np.testing.assert_allclose(found.cov[:, i, 0, 0], expected[:, 1], rtol=1e-12, atol=1e-15)
 
 
@@ -67,8 +69,8 @@ def designed_on(designs, trajectories):
 class Interpreter:
     """Executes printed equations for every trajectory of an ensemble, one at a time.
 
-    `values` maps each matrix symbol to an array (N, rows, columns).  Structural functions are looked up
-    when an equation asks for them; moments are taken over the trajectories.
+    `values` maps each matrix symbol to an array (N, rows, columns).  Structural functions are
+    looked up when an equation asks for them; moments are taken over the trajectories.
     """
 
     def __init__(self, values, functions):
@@ -109,7 +111,9 @@ class Interpreter:
         return np.broadcast_to(self.moment(symbol), (self.runs, *self.moment(symbol).shape))
 
     def moment(self, symbol):
-        columns = {known: array[..., 0] for known, array in self.values.items() if array.shape[-1] == 1}
+        columns = {
+            known: array[..., 0] for known, array in self.values.items() if array.shape[-1] == 1
+        }
         for left, a in columns.items():
             if symbol == s.mean(left):
                 return a.mean(axis=0)[:, None]
@@ -129,19 +133,24 @@ class Interpreter:
 
 PRINTED = {
     "p=1": lambda: Model.define(
-        ["0.9*x1 + 0.3*x2 + 0.1*x1*v", "0.8*x2 - 0.1*x1**2 + 0.3*v"], ["x1 + 0.2*x2**2 + 0.3*w + 0.1*x1*w"],
-        prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]}, state_noise={"mean": 0.2, "variance": 0.7},
+        ["0.9*x1 + 0.3*x2 + 0.1*x1*v", "0.8*x2 - 0.1*x1**2 + 0.3*v"],
+        ["x1 + 0.2*x2**2 + 0.3*w + 0.1*x1*w"],
+        prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]},
+        state_noise={"mean": 0.2, "variance": 0.7},
         meter_noise={"mean": -0.1, "variance": 1.3},
     ),
     "p=2": lambda: Model.define(
-        ["0.9*x1 + 0.3*x2*x1 + 0.4*v1", "0.8*x2 - 0.1*x1**2 + 0.3*v2*x1"], ["x1*x2 + 0.3*w1", "x2 + 0.1*x1*w1 + 0.4*w2"],
-        prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]}, meter_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
+        ["0.9*x1 + 0.3*x2*x1 + 0.4*v1", "0.8*x2 - 0.1*x1**2 + 0.3*v2*x1"],
+        ["x1*x2 + 0.3*w1", "x2 + 0.1*x1*w1 + 0.4*w2"],
+        prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]},
+        meter_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
     ),
-}  # fmt: skip
+}
 
 
 def structural_values(model, structure):
-    """What the printed functional symbols stand for: arrays (N, r, c) from the arrays of their arguments."""
+    """What the printed functional symbols stand for: arrays (N, r, c) from the arrays of their
+    arguments."""
     n, p = model.n, model.p
     taylor = linearised(model)  # whose tau and h are a(z, m_v) and b(lambda, m_w)
 
@@ -150,7 +159,8 @@ def structural_values(model, structure):
             size = len(values[mean])
             found = function(values[mean][..., 0], values[cov] if cov else np.eye(n))[which]
             return np.broadcast_to(
-                found[..., None] if columns is None else found, (size, found.shape[-1 if columns is None else -2], columns or 1)
+                found[..., None] if columns is None else found,
+                (size, found.shape[-1 if columns is None else -2], columns or 1),
             )
 
         return of
@@ -195,19 +205,32 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
     estimates = []
     for k in range(steps):
         # what fills zeta: of two steps, or of what there is
-        functions[MEASUREMENTS] = lambda values, k=k: np.concatenate(y[k::-1][:2], axis=1)[..., None]
-        functions[ESTIMATES] = lambda values, old=tuple(estimates): np.concatenate([values[s.z], *old], axis=1)
-        given = {s.lam: lam, s.Psi: Psi, s.x: x[k][..., None], s.y: y[k][..., None], s.x_next: x[k + 1][..., None]}
+        functions[MEASUREMENTS] = lambda values, k=k: np.concatenate(y[k::-1][:2], axis=1)[
+            ..., None
+        ]
+        functions[ESTIMATES] = lambda values, old=tuple(estimates): np.concatenate(
+            [values[s.z], *old], axis=1
+        )
+        given = {
+            s.lam: lam,
+            s.Psi: Psi,
+            s.x: x[k][..., None],
+            s.y: y[k][..., None],
+            s.x_next: x[k + 1][..., None],
+        }
         printed = Interpreter(given, functions).execute(equations)
         state = filter_.step(state, y[k])
-        # Printed: plain inverses and differences; run: solutions and Joseph's form. 15 trajectories, conditions up to 1e4.
+        # Printed: plain inverses and differences; run: solutions and Joseph's form. 15
+        # trajectories, conditions up to 1e4.
         tolerance = {"rtol": 1e-8, "atol": 1e-9}
         np.testing.assert_allclose(state.posterior.mean, printed[s.z][..., 0], **tolerance)
         np.testing.assert_allclose(state.predicted.mean, printed[s.lam_next][..., 0], **tolerance)
         if s.P in printed:
             np.testing.assert_allclose(state.posterior.cov, printed[s.P], **tolerance)
         if s.Psi_next in printed:
-            np.testing.assert_allclose(np.broadcast_to(state.predicted.cov, (runs, 2, 2)), printed[s.Psi_next], **tolerance)
+            np.testing.assert_allclose(
+                np.broadcast_to(state.predicted.cov, (runs, 2, 2)), printed[s.Psi_next], **tolerance
+            )
             Psi = printed[s.Psi_next]
         lam, estimates = printed[s.lam_next], [printed[s.z]]
 
@@ -222,7 +245,8 @@ def test_every_equation_is_printed_once_and_in_order(family, columns):
     assert " ".join(rows).replace(r" &\qquad", "").replace(r" \\", "") == " ".join(one_by_one)
 
 
-# ---------------------------------------------------------------- missing measurements and degenerate cases
+# ---------------------------------------------------------------- missing measurements and
+# degenerate cases
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)
@@ -244,10 +268,11 @@ def test_a_designed_filter_stops_where_its_design_does(variant53, trajectories):
 
 
 def test_the_duof_s_own_covariances_are_those_of_its_errors():
-    """On the ensemble of the design both covariances are the sample's: of x - z after the correction, of x' - lambda' ahead.
+    """On the ensemble of the design both covariances are the sample's: of x - z after the
+    correction, of x' - lambda' ahead.
 
-    The residual of an affine regression with an offset is the covariance of target less fit, and the fit's mean is the
-    target's, so no bias hides in it.
+    The residual of an affine regression with an offset is the covariance of target less fit, and
+    the fit's mean is the target's, so no bias hides in it.
     """
     model, steps = PRINTED["p=2"](), 3
     x, y = simulate(model, 40, steps + 1, seed=14)
@@ -257,17 +282,20 @@ def test_the_duof_s_own_covariances_are_those_of_its_errors():
         state = filter_.step(state, y[k])
         for law, truth in ((state.posterior, x[k]), (state.predicted, x[k + 1])):
             error = truth - law.mean
-            # Cov(t) - matrix Cov(t, r)^T against the errors themselves: covariances of order 1, correlations below 0.99
+            # Cov(t) - matrix Cov(t, r)^T against the errors themselves: covariances of order 1,
+            # correlations below 0.99
             np.testing.assert_allclose(error.mean(axis=0), 0, rtol=0, atol=1e-12)
             np.testing.assert_allclose(law.cov, np.cov(error.T, bias=True), rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("family", [fos, mfos])
 def test_without_a_measurement_three_arguments_predict_from_the_prediction(family):
-    """In place of a missing y stands h = M[y | prediction], the value that leaves z = lambda; so u = lambda.
+    """In place of a missing y stands h = M[y | prediction], the value that leaves z = lambda; so u
+    = lambda.
 
-    At k = 0 of a linear model z is an affine function of y, and the regression of x on (y, z) is exact wherever the pair
-    lies on that line: x ~ z.  (h, lambda) lies there, at innovation 0; (0, lambda) does not.
+    At k = 0 of a linear model z is an affine function of y, and the regression of x on (y, z) is
+    exact wherever the pair lies on that line: x ~ z.  (h, lambda) lies there, at innovation 0; (0,
+    lambda) does not.
     """
     one = LINEAR["n=2, p=2"]
     model = one.model()

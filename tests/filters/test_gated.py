@@ -1,11 +1,35 @@
-"""The gate: refusing is missing, as many as promised, in every filter; and how a lost track is found again."""
+"""The gate: refusing is missing, as many as promised, in every filter; and how a lost track is
+found again."""
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from kfcourse import Model, gaussian, likelihood, linearised, predictions, run, simulate, smooth, unscented
-from kfcourse.filters import alpha_beta, aof, duof, fos, gated, imm, iterated, kalman_filter, mfos, particle, pointmass, robust
+from kfcourse import (
+    Model,
+    gaussian,
+    likelihood,
+    linearised,
+    predictions,
+    run,
+    simulate,
+    smooth,
+    unscented,
+)
+from kfcourse.filters import (
+    alpha_beta,
+    aof,
+    duof,
+    fos,
+    gated,
+    imm,
+    iterated,
+    kalman_filter,
+    mfos,
+    particle,
+    pointmass,
+    robust,
+)
 from kfcourse.linear.consistency import innovations
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
@@ -16,16 +40,19 @@ pytestmark = pytest.mark.quick
 
 
 def walk(**options):
-    return Model.define("0.95*x + 0.3*v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}, **options)
+    return Model.define(
+        "0.95*x + 0.3*v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}, **options
+    )
 
 
 @pytest.fixture(scope="module")
 def plane() -> Model:
     """Two components measured, with noises of different size and correlated."""
     return Model.define(
-        ["x1 + 0.5*x3 + 0.1*v1", "x2 + 0.5*x4 + 0.1*v2", "x3 + 0.3*v3", "x4 + 0.3*v4"], ["x1 + w1", "x2 + 0.2*x1 + w2"],
+        ["x1 + 0.5*x3 + 0.1*v1", "x2 + 0.5*x4 + 0.1*v2", "x3 + 0.3*v3", "x4 + 0.3*v4"],
+        ["x1 + w1", "x2 + 0.2*x1 + w2"],
         meter_noise={"variance": [[0.5, 0.2], [0.2, 0.3]]},
-    )  # fmt: skip
+    )
 
 
 def spoiled(y):
@@ -51,11 +78,21 @@ def every_filter():
     model = walk()
     designs = [duof(model), fos(gaussian(model)), mfos(linearised(model))]
     designed = design(designs, Ensemble(model, 300, 9, seed=1))
-    modes = [linearised(walk()), linearised(Model.define("0.5*x + v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}))]
+    modes = [
+        linearised(walk()),
+        linearised(Model.define("0.5*x + v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7})),
+    ]
     return [
-        aof(linearised(model)), aof(unscented(model)), iterated(gaussian(model), 3), kalman_filter(model),
-        robust(gaussian(model)), *designed, imm(modes, [[0.9, 0.1], [0.2, 0.8]]), pointmass(model), particle(model, 200, seed=3),
-    ]  # fmt: skip
+        aof(linearised(model)),
+        aof(unscented(model)),
+        iterated(gaussian(model), 3),
+        kalman_filter(model),
+        robust(gaussian(model)),
+        *designed,
+        imm(modes, [[0.9, 0.1], [0.2, 0.8]]),
+        pointmass(model),
+        particle(model, 200, seed=3),
+    ]
 
 
 def test_in_every_filter_what_is_refused_is_missing():
@@ -70,7 +107,9 @@ def test_in_every_filter_what_is_refused_is_missing():
         np.testing.assert_array_equal(found.mean, behind.mean, err_msg=one.name)
         np.testing.assert_array_equal(found.cov, behind.cov, err_msg=one.name)
         if one.name != "aof-exact":  # which refuses without a gate what contradicts the model
-            assert np.abs(run(one, y).mean - found.mean).max() > 0.5 or one.name.startswith("robust")
+            assert np.abs(run(one, y).mean - found.mean).max() > 0.5 or one.name.startswith(
+                "robust"
+            )
 
 
 def test_the_alpha_beta_filter_has_a_gate_too():
@@ -79,19 +118,23 @@ def test_the_alpha_beta_filter_has_a_gate_too():
     y[8, 1] += 500.0
     guarded = gated(alpha_beta(model, 0.5, 0.2), structure=linearised(model))
     assert refused(guarded, y)[8, 1]
-    np.testing.assert_array_equal(run(guarded, y).mean, run(alpha_beta(model, 0.5, 0.2), without(guarded, y)).mean)
+    np.testing.assert_array_equal(
+        run(guarded, y).mean, run(alpha_beta(model, 0.5, 0.2), without(guarded, y)).mean
+    )
 
 
 @pytest.mark.parametrize("probability", [0.9, 0.99])
 def test_a_right_filter_loses_as_many_as_it_was_told(plane, probability):
-    """Two, one or no component measured; the model is linear, so the innovations are normal and F is right."""
+    """Two, one or no component measured; the model is linear, so the innovations are normal and F
+    is right."""
     y = simulate(plane, 400, 12, seed=5).y.copy()
     rng = np.random.default_rng(6)
     y[rng.random(y.shape) < 0.2] = np.nan
     one = gated(kalman_filter(plane), probability)
     found = refused(one, y)
     for count in (1, 2):
-        # the first measurement of each kind in a record: what was refused before it would make F too small afterwards
+        # the first measurement of each kind in a record: what was refused before it would make F
+        # too small afterwards
         first = (~np.isnan(y)).sum(axis=-1) == count
         share, size = found[0][first[0]].mean(), first[0].sum()
         assert abs(share - (1 - probability)) < 4 * np.sqrt(probability * (1 - probability) / size)
@@ -99,9 +142,16 @@ def test_a_right_filter_loses_as_many_as_it_was_told(plane, probability):
 
 
 def test_an_innovation_of_a_turn_is_none():
-    model = Model.define("x + 0.1*v", "x + 0.2*w", angles={"x": ["x"], "y": ["y"]}, prior={"mean": 3.1, "variance": 0.01})
+    model = Model.define(
+        "x + 0.1*v",
+        "x + 0.2*w",
+        angles={"x": ["x"], "y": ["y"]},
+        prior={"mean": 3.1, "variance": 0.01},
+    )
     y = np.array([3.1, -3.1, 3.12, 1.0, -3.13])
-    np.testing.assert_array_equal(weights(gated(aof(linearised(model))), y).ravel(), [1, 1, 1, 0, 1])
+    np.testing.assert_array_equal(
+        weights(gated(aof(linearised(model))), y).ravel(), [1, 1, 1, 0, 1]
+    )
 
 
 # ---------------------------------------------------------------- the lost track
@@ -133,7 +183,8 @@ def test_after_its_patience_the_gate_lets_the_next_one_through(patience):
     assert not found[10 + patience :].any()
     assert not found[:10].any()
     error = np.abs(run(one, y).mean - x)
-    # let through with a prediction as wide as the jump, so the estimate is the measurement: four standard deviations of it
+    # let through with a prediction as wide as the jump, so the estimate is the measurement: four
+    # standard deviations of it
     assert error[10 + patience, np.arange(50) != 3].max() < 4.5
     assert error[11 + patience, 3] < 4.5
     # and is on the track long before the filter without a gate, whose gain has settled at a tenth
@@ -142,7 +193,10 @@ def test_after_its_patience_the_gate_lets_the_next_one_through(patience):
 
 
 def test_gaps_neither_feed_nor_calm_impatience_and_the_next_measurement_passes_whatever_it_is():
-    one = gated(kalman_filter(Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})), patience=2)
+    one = gated(
+        kalman_filter(Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})),
+        patience=2,
+    )
     gap = np.nan
     y = np.array([0.0, 50.0, gap, gap, 51.0, gap, -4000.0, 0.0])
     np.testing.assert_array_equal(weights(one, y).ravel(), [1, 0, gap, gap, 0, gap, 1, 0])
@@ -156,15 +210,20 @@ def test_what_a_gate_cannot_stand_before_is_told():
         gated(duof(walk()))
     with pytest.raises(ValueError, match=r"a gate needs the structural functions.*imm has none"):
         gated(imm([linearised(walk())], [[1.0]]))
-    for one in (pointmass(walk()), particle(walk(), 10)):  # their own ways back need memories that the gate covers
-        with pytest.raises(ValueError, match=rf"looking back needs the structural functions.*gated-{one.name} has none"):
+    # their own ways back need memories that the gate covers
+    for one in (pointmass(walk()), particle(walk(), 10)):
+        with pytest.raises(
+            ValueError,
+            match=rf"looking back needs the structural functions.*gated-{one.name} has none",
+        ):
             smooth(gated(one, structure=linearised(walk())), np.zeros(3))
     with pytest.raises(ValueError, match=r"kalman takes every measurement as it is: ask gated"):
         weights(kalman_filter(walk()), np.zeros(3))
 
 
 def test_components_are_judged_each_for_itself_on_request(plane):
-    """A gross error of one component costs that component alone; the likelihood counts it as one at the gate's edge."""
+    """A gross error of one component costs that component alone; the likelihood counts it as one at
+    the gate's edge."""
     y = spoiled(simulate(plane, 3, 9, seed=4).y)
     one = aof(linearised(plane))
     behind = gated(one, 0.999, by_component=True)

@@ -24,7 +24,8 @@ def plane() -> Model:
 
 @pytest.mark.parametrize("rows", [[0, 1], [0], [1]])
 def test_it_settles_where_weight_and_law_agree(plane, rows):
-    """x ~ N(z, p) by one dense regression with R / w, and w by its own equation at that law; with missing components too."""
+    """x ~ N(z, p) by one dense regression with R / w, and w by its own equation at that law; with
+    missing components too."""
     degrees, H = 3.0, np.array([[1.0, 0.0], [0.2, 1.0]])[rows]
     R, y = NOISE[np.ix_(rows, rows)], np.full((1, 4, 2), np.nan)
     y[0][:, rows] = np.array([[0.9, -0.2], [3.0, 2.0], [-6.0, 1.0], [40.0, -90.0]])[:, rows]
@@ -33,7 +34,9 @@ def test_it_settles_where_weight_and_law_agree(plane, rows):
     for i in range(4):
         information = np.linalg.inv(PRIOR_COV) + w[i] * H.T @ np.linalg.solve(R, H)
         p = np.linalg.inv(information)
-        z = p @ (np.linalg.solve(PRIOR_COV, PRIOR_MEAN) + w[i] * H.T @ np.linalg.solve(R, y[0, i, rows]))
+        z = p @ (
+            np.linalg.solve(PRIOR_COV, PRIOR_MEAN) + w[i] * H.T @ np.linalg.solve(R, y[0, i, rows])
+        )
         np.testing.assert_allclose(found.mean[0, i], z, rtol=1e-9)
         np.testing.assert_allclose(found.cov[0, i], p, rtol=1e-9)
         r = y[0, i, rows] - H @ z
@@ -53,7 +56,9 @@ def test_with_huber_s_weights_it_is_the_least_of_his_cost(plane, rows):
         def cost(z, i=i):
             off, r = z - PRIOR_MEAN, y[0, i, rows] - H @ z
             size = np.sqrt(r @ np.linalg.solve(R, r))
-            return off @ np.linalg.solve(PRIOR_COV, off) / 2 + (size**2 / 2 if size < edge else edge * size - edge**2 / 2)
+            return off @ np.linalg.solve(PRIOR_COV, off) / 2 + (
+                size**2 / 2 if size < edge else edge * size - edge**2 / 2
+            )
 
         best = minimize(cost, PRIOR_MEAN, method="BFGS", options={"gtol": 1e-9}).x
         # where the search stops is known to the root of the rounding of the cost, some hundreds
@@ -68,13 +73,18 @@ def test_outliers_hurt_it_less_and_whole_records_are_smoothed(plane):
     rng = np.random.default_rng(4)
     bad = rng.random((20, 500, 1)) < 0.05
     y = y + bad * 12 * rng.standard_normal(y.shape)
-    believing, doubting, guarded = aof(linearised(plane)), robust(linearised(plane)), gated(aof(linearised(plane)))
+    believing, doubting, guarded = (
+        aof(linearised(plane)),
+        robust(linearised(plane)),
+        gated(aof(linearised(plane))),
+    )
 
     def errors(laws):
         return ((laws.mean - x) ** 2).sum(axis=-1).mean(axis=0)
 
     worst, weighted, refusing, later = (
-        errors(laws) for laws in (run(believing, y), run(doubting, y), run(guarded, y), smooth(doubting, y))
+        errors(laws)
+        for laws in (run(believing, y), run(doubting, y), run(guarded, y), smooth(doubting, y))
     )
     for more, less in ((worst, weighted), (worst, refusing), (weighted, later)):
         difference = more - less

@@ -1,4 +1,5 @@
-"""Meters with a noise that is solved for: the same filter as of the measurement transformed, which is linear in the noise."""
+"""Meters with a noise that is solved for: the same filter as of the measurement transformed, which
+is linear in the noise."""
 
 import numpy as np
 import pytest
@@ -18,12 +19,14 @@ from kfcourse.filters.densities import likelihood
     ],
 )
 def test_it_is_the_filter_of_the_transformed_measurement(meter, linear, back):
-    """Bayes' rule does not know in which units y is written: the factor |d omega/dy| is the same for all states."""
+    """Bayes' rule does not know in which units y is written: the factor |d omega/dy| is the same
+    for all states."""
     curved, straight = (Model.define("0.9*x + 0.4*v", one) for one in (meter, linear))
     _, y = simulate(curved, 10, 5, seed=1)
     found, expected = run(pointmass(curved), y), run(pointmass(straight), back(y))
     sigma = np.sqrt(expected.cov[..., 0, 0])
-    assert (np.abs(found.mean - expected.mean)[..., 0] < 2e-6 * sigma).all()  # twice the accuracy of a step
+    # twice the accuracy of a step
+    assert (np.abs(found.mean - expected.mean)[..., 0] < 2e-6 * sigma).all()
     np.testing.assert_allclose(found.cov, expected.cov, rtol=4e-6)
 
 

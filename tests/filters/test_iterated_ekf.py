@@ -1,4 +1,5 @@
-"""The iterated filter: Gauss and Newton's method, and the printed equations at the tangent and with sigma points."""
+"""The iterated filter: Gauss and Newton's method, and the printed equations at the tangent and with
+sigma points."""
 
 import re
 
@@ -22,9 +23,11 @@ NOISE = np.array([[0.04, 0.01], [0.01, 0.05]])
 def ranges() -> Model:
     """Range and a product, both curved over the prior; correlated noises."""
     return Model.define(
-        ["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 + 0.2*sin(x1) + 0.1*v2"], ["sqrt(x1**2 + x2**2) + w1", "x1*x2 + w2"],
-        prior={"mean": PRIOR_MEAN, "variance": PRIOR_COV}, meter_noise={"variance": NOISE},
-    )  # fmt: skip
+        ["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 + 0.2*sin(x1) + 0.1*v2"],
+        ["sqrt(x1**2 + x2**2) + w1", "x1*x2 + w2"],
+        prior={"mean": PRIOR_MEAN, "variance": PRIOR_COV},
+        meter_noise={"variance": NOISE},
+    )
 
 
 def meter(x):
@@ -70,7 +73,8 @@ def test_each_round_is_a_step_of_gauss_and_newton(ranges, rounds):
 
 @pytest.mark.parametrize("build", [linearised, unscented])
 def test_the_printed_equations_are_the_filter(ranges, build):
-    """Gauss and Newton's method at the tangent, iterated posterior linearisation with sigma points."""
+    """Gauss and Newton's method at the tangent, iterated posterior linearisation with sigma
+    points."""
     y, rounds = measured(ranges, 1, seed=8), 3
     structure = build(ranges)
     values = {s.y: y[0, 0][:, None], s.lam: PRIOR_MEAN[:, None], s.Psi: PRIOR_COV}
@@ -78,11 +82,19 @@ def test_the_printed_equations_are_the_filter(ranges, build):
     values |= {z_i: values[s.lam], P_i: values[s.Psi]}
     for _ in range(rounds):
         measurement = structure.measure(values[z_i][:, 0], values[P_i])
-        values |= {symbol("h("): measurement.h[:, None], symbol("G("): measurement.G, symbol("F("): measurement.F}
+        values |= {
+            symbol("h("): measurement.h[:, None],
+            symbol("G("): measurement.G,
+            symbol("F("): measurement.F,
+        }
         for equation in EQUATIONS:
             arguments = sorted(equation.rhs.atoms(sp.MatrixSymbol), key=str)
-            dummies = [sp.MatrixSymbol(f"M{j}", *argument.shape) for j, argument in enumerate(arguments)]
-            function = sp.lambdify(dummies, equation.rhs.xreplace(dict(zip(arguments, dummies, strict=True))), "numpy")
+            dummies = [
+                sp.MatrixSymbol(f"M{j}", *argument.shape) for j, argument in enumerate(arguments)
+            ]
+            function = sp.lambdify(
+                dummies, equation.rhs.xreplace(dict(zip(arguments, dummies, strict=True))), "numpy"
+            )
             values[equation.lhs] = function(*(values[argument] for argument in arguments))
         values |= {z_i: values[symbol(r"z^{(i+1)}")], P_i: values[symbol(r"p^{(i+1)}")]}
     found = run(iterated(structure, rounds), y)
@@ -93,12 +105,15 @@ def test_the_printed_equations_are_the_filter(ranges, build):
 
 def symbol(start):
     """The symbol of the printed equations whose LaTeX starts so."""
-    every = set().union(*(q.lhs.atoms(sp.MatrixSymbol) | q.rhs.atoms(sp.MatrixSymbol) for q in EQUATIONS))
+    every = set().union(
+        *(q.lhs.atoms(sp.MatrixSymbol) | q.rhs.atoms(sp.MatrixSymbol) for q in EQUATIONS)
+    )
     (one,) = [q for q in every if re.sub(r"^\{(.*)\}$", r"\1", q.name).startswith(start)]
     return one
 
 
-# ---------------------------------------------------------------- missing measurements, shapes, errors
+# ---------------------------------------------------------------- missing measurements, shapes,
+# errors
 
 
 @pytest.mark.parametrize("iterations", [0, -1, 1.5, 2.0, True, "3", None, float("nan")])

@@ -1,4 +1,5 @@
-"""Filters of models that jump: against all histories of modes, and the cases in which they are other filters."""
+"""Filters of models that jump: against all histories of modes, and the cases in which they are
+other filters."""
 
 from dataclasses import replace
 from functools import partial
@@ -41,7 +42,13 @@ LASTING, FIRST = [[0.9, 0.1], [0.3, 0.7]], [0.8, 0.2]
 
 def failing(modes=SENSOR, transition=LASTING, first=FIRST):
     return JumpModel.define(
-        "0.9*x + s*v", "x + C*w", {"s": 0.7}, modes=modes, transition=transition, first=first, prior={"mean": 3, "variance": 4}
+        "0.9*x + s*v",
+        "x + C*w",
+        {"s": 0.7},
+        modes=modes,
+        transition=transition,
+        first=first,
+        prior={"mean": 3, "variance": 4},
     )
 
 
@@ -49,11 +56,17 @@ AFFINE = JumpModel.define(
     "c*x + r + s*v",
     "g*x + f*w",
     {"c": 0.9, "r": 0.0, "s": 0.5, "g": 1.0, "f": 0.5},
-    modes={"calm": {}, "carried": {"parameters": {"c": 1.1, "r": 1.0, "g": 0.5}}, "wild": {"parameters": {"s": 2.0, "f": 1.0}}},
+    modes={
+        "calm": {},
+        "carried": {"parameters": {"c": 1.1, "r": 1.0, "g": 0.5}},
+        "wild": {"parameters": {"s": 2.0, "f": 1.0}},
+    },
     transition=[[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]],
     first=[0.5, 0.3, 0.2],
 )
-TWO_CHAINS = JumpModel.define("x + v", "x + w", modes={"one": {}, "other": {}}, transition=LASTING, first=FIRST)
+TWO_CHAINS = JumpModel.define(
+    "x + v", "x + w", modes={"one": {}, "other": {}}, transition=LASTING, first=FIRST
+)
 CURVED = JumpModel.define(
     "x - 0.4*sin(x) + s*v",
     "g*x + 0.3*x**2 + f*(1 + x**2)*w",
@@ -100,8 +113,14 @@ def test_missing_measurements_leave_the_exact_filter_as_predicted():
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", modes={"a": {}}, transition=[1]), "scalar models"),
-        (JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]), "no noise enters the meter"),
+        (
+            JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", modes={"a": {}}, transition=[1]),
+            "scalar models",
+        ),
+        (
+            JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]),
+            "no noise enters the meter",
+        ),
     ],
 )
 def test_the_exact_filter_says_what_it_cannot_do(model, message):
@@ -124,7 +143,8 @@ def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
 
 
 def test_what_is_merged_when():
-    """Nothing is merged before y_0, pairs of modes by GPB2 only after y_1: so far they are exact."""
+    """Nothing is merged before y_0, pairs of modes by GPB2 only after y_1: so far they are
+    exact."""
     y = simulate(AFFINE, 5, 3, seed=6).y
     for build, exact in ((imm, 1), (logic_dynamic, 1), (gpb2, 2)):
         mean, cov, probability, *_ = follow(of(build, AFFINE), y)
@@ -139,10 +159,12 @@ def test_what_is_merged_when():
 
 
 def test_a_mode_that_no_measurement_believes_does_not_take_the_filter_away():
-    """The faulty accelerometers of the landing show a hundredth: corrected as if they did, a sound flight leaves the numbers.
+    """The faulty accelerometers of the landing show a hundredth: corrected as if they did, a sound
+    flight leaves the numbers.
 
-    GPB2 went on from such a law, of probability 0, for ever.  Where all modes lead on, it must not matter: whoever merges sooner
-    forgets it by himself, and as each measurement here leaves no doubt of the mode, both estimate the same.
+    GPB2 went on from such a law, of probability 0, for ever.  Where all modes lead on, it must not
+    matter: whoever merges sooner forgets it by himself, and as each measurement here leaves no
+    doubt of the mode, both estimate the same.
     """
     model = find_variant("J3").model
     y = simulate(model, 300, 25, seed=1).y
@@ -159,13 +181,16 @@ def test_a_chain_that_changes_with_time():
     assert (y.mode == (np.arange(10) >= 5)[:, None]).all()
     for one in (of(logic_dynamic, model), of(gpb2, model), pointmass(model)):
         probability = follow(one, y.y)[2]
-        np.testing.assert_allclose(probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12)
+        np.testing.assert_allclose(
+            probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12
+        )
 
 
 # --- the FOS with modes
 
 
-# Each filter with modes, the one that it is without, and what both remember of (y_k, y_k-1, ...), (z_k, z_k-1, ...).
+# Each filter with modes, the one that it is without, and what both remember of (y_k, y_k-1, ...),
+# (z_k, z_k-1, ...).
 REMEMBERING = {
     "fos": (logic_dynamic_fos, fos, (0, 1)),
     "fkp": (partial(logic_dynamic_fkp, memory=3), partial(fkp, memory=3), (3, 0)),
@@ -178,12 +203,15 @@ OF_EACH = pytest.mark.parametrize("family", REMEMBERING)
 @pytest.mark.parametrize("kind", [gaussian, linearised])
 def test_one_mode_is_the_filter_without_modes_bit_for_bit(family, kind):
     with_modes, without, _ = REMEMBERING[family]
-    model = JumpModel.define("x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w", modes={"only": {}}, transition=[1])
+    model = JumpModel.define(
+        "x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w", modes={"only": {}}, transition=[1]
+    )
     plain = model.modes[0]
     y = simulate(plain, 20, 8, seed=4).y
     y[3, 0] = y[5, :] = np.nan
     (found,), (expected,) = (
-        design([one], Ensemble(plain, 2000, 8, seed=1)) for one in (with_modes(model, [kind(plain)]), without(kind(plain)))
+        design([one], Ensemble(plain, 2000, 8, seed=1))
+        for one in (with_modes(model, [kind(plain)]), without(kind(plain)))
     )
     np.testing.assert_array_equal(run(found, y).mean, run(expected, y).mean)
     np.testing.assert_array_equal(run(found, y).cov, run(expected, y).cov)
@@ -197,11 +225,16 @@ def in_each_mode(block, modes):
 
 @pytest.mark.parametrize("family", ["fos", "fkp", "fbp"])
 def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
-    """With moments that are exact, and a memory that holds all there is; rounding as for the filters without modes."""
+    """With moments that are exact, and a memory that holds all there is; rounding as for the
+    filters without modes."""
     one, steps = LINEAR["n=2, p=2"], 5
     plain = one.model()
     model = replace(TWO_CHAINS, modes=(plain, plain))
-    build = {"fos": logic_dynamic_fos, "fkp": partial(logic_dynamic_fkp, memory=steps), "fbp": logic_dynamic_fbp}[family]
+    build = {
+        "fos": logic_dynamic_fos,
+        "fkp": partial(logic_dynamic_fkp, memory=steps),
+        "fbp": logic_dynamic_fbp,
+    }[family]
     moments = [in_each_mode(moment, 2) for moment in exact_ensemble(one, steps, seed=3)]
     (found,) = design([build(model, [gaussian(plain)] * 2)], moments)
     y = simulate(plain, 4, steps, seed=8).y
@@ -212,7 +245,8 @@ def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
 
 @OF_EACH
 def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family):
-    """The note's equations by hand: regressions and normal laws over the trajectories of each mode, for a scalar sensor."""
+    """The note's equations by hand: regressions and normal laws over the trajectories of each mode,
+    for a scalar sensor."""
     with_modes, _, (measurements, estimates) = REMEMBERING[family]
     model, runs, steps = failing(), 500, 6
     blocks = list(Ensemble(model, runs, steps, seed=3))
@@ -222,9 +256,16 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
     variance, pi, ys, zs = np.array([1.0, 100.0]), np.array(LASTING), [], []
     for k, block in enumerate(blocks):
         x, y = block.x[:, 0], block.y[:, 0]
-        L = np.array([np.exp(-0.5 * (y - m[j]) ** 2 / (d[j] + variance[j])) / np.sqrt(d[j] + variance[j]) for j in (0, 1)])
+        L = np.array(
+            [
+                np.exp(-0.5 * (y - m[j]) ** 2 / (d[j] + variance[j])) / np.sqrt(d[j] + variance[j])
+                for j in (0, 1)
+            ]
+        )
         mu = c.T * L / (c.T * L).sum(axis=0)
-        z = (mu * np.array([m[j] + d[j] / (d[j] + variance[j]) * (y - m[j]) for j in (0, 1)])).sum(axis=0)
+        z = (mu * np.array([m[j] + d[j] / (d[j] + variance[j]) * (y - m[j]) for j in (0, 1)])).sum(
+            axis=0
+        )
         state = one.step(state, block.y)
         np.testing.assert_allclose(state.posterior.mean[:, 0], z, rtol=1e-7)
         np.testing.assert_allclose(state.memory.probability, mu.T, rtol=1e-6, atol=1e-9)
@@ -236,7 +277,9 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
             rows = np.vstack([zeta, np.ones(runs)]).T
             u[i] = rows @ np.linalg.lstsq(rows[there], x[there])[0]
             T[i] = np.var((x - u[i])[there])
-            law = multivariate_normal(zeta[:, there].mean(axis=1), np.cov(zeta[:, there], bias=True))
+            law = multivariate_normal(
+                zeta[:, there].mean(axis=1), np.cov(zeta[:, there], bias=True)
+            )
             xi[i] = model.law_at(k)[i] * law.pdf(zeta.T)
         xi /= xi.sum(axis=0)
         c = xi.T @ pi
@@ -256,8 +299,12 @@ def test_a_missing_measurement_is_remembered_as_what_all_modes_expect():
     state = one.init(5)
     for measured in y[:3]:
         before, state = state, one.step(state, measured)
-    np.testing.assert_array_equal(state.memory.kept.measurements[0][[0, 2, 3, 4]], y[2][[0, 2, 3, 4]])
-    expected = sum(before.memory.expected[1, j] * before.memory.predicted[j].mean[1] for j in (0, 1))
+    np.testing.assert_array_equal(
+        state.memory.kept.measurements[0][[0, 2, 3, 4]], y[2][[0, 2, 3, 4]]
+    )
+    expected = sum(
+        before.memory.expected[1, j] * before.memory.predicted[j].mean[1] for j in (0, 1)
+    )
     np.testing.assert_allclose(state.memory.kept.measurements[0][1], expected, rtol=1e-12)
     np.testing.assert_allclose(state.posterior.mean[1], expected, rtol=1e-12)
 
@@ -265,14 +312,28 @@ def test_a_missing_measurement_is_remembered_as_what_all_modes_expect():
 def test_the_fos_with_modes_says_what_it_cannot_do():
     rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
     with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
-        design([logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])], Ensemble(rare, 100, 3, seed=1))
-    turning = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1], angles={"x": ["x"], "y": []})
-    for build, name in ((logic_dynamic_fos, "FOS"), (logic_dynamic_fkp, "FKP4"), (logic_dynamic_fbp, "FBP4")):
-        with pytest.raises(ModelError, match=f"the logic-dynamic {name} takes no components that are angles"):
+        design(
+            [logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])],
+            Ensemble(rare, 100, 3, seed=1),
+        )
+    turning = JumpModel.define(
+        "x + v", "x + w", modes={"a": {}}, transition=[1], angles={"x": ["x"], "y": []}
+    )
+    for build, name in (
+        (logic_dynamic_fos, "FOS"),
+        (logic_dynamic_fkp, "FKP4"),
+        (logic_dynamic_fbp, "FBP4"),
+    ):
+        with pytest.raises(
+            ModelError, match=f"the logic-dynamic {name} takes no components that are angles"
+        ):
             build(turning, [gaussian(turning.modes[0])])
     for memory in (0, 2.5, True):
         for build in (logic_dynamic_fkp, logic_dynamic_fbp):
-            with pytest.raises(ValueError, match=f"a memory holds so many steps, a positive whole number.*got {memory!r}"):
+            with pytest.raises(
+                ValueError,
+                match=f"a memory holds so many steps, a positive whole number.*got {memory!r}",
+            ):
                 build(rare, [gaussian(one) for one in rare.modes], memory)
 
 

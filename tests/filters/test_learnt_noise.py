@@ -1,4 +1,5 @@
-"""A noise of unknown size, learnt on the way: against the filter that knows it, and against its own equations."""
+"""A noise of unknown size, learnt on the way: against the filter that knows it, and against its own
+equations."""
 
 import numpy as np
 import pytest
@@ -21,24 +22,34 @@ def last(one, y):
 def test_it_finds_the_size_of_the_noise_and_is_as_good_as_who_knows_it():
     x, y = simulate(model(4.0), 1000, 300, seed=1)
     scale = last(adaptive(linearised(model(1.0))), y).memory.scale
-    # M s: 4 to within a standard error of 4 / sqrt(50 1000), and a bias of second order in 1 / window.
+    # M s: 4 to within a standard error of 4 / sqrt(50 1000), and a bias of second order in 1 /
+    # window.
     assert abs(scale.mean() - 4) < 4 * 4 / np.sqrt(50_000) + 4 / 50
     assert 0.5 < scale.std() / (4 / np.sqrt(50)) < 1.5
-    filters = aof(linearised(model(4.0))), adaptive(linearised(model(1.0))), aof(linearised(model(1.0)))
+    filters = (
+        aof(linearised(model(4.0))),
+        adaptive(linearised(model(1.0))),
+        aof(linearised(model(1.0))),
+    )
     knows, learns, wrong = (((run(one, y).mean - x)[200:] ** 2).mean() for one in filters)
     assert learns < 1.02 * knows < wrong / 1.2
 
 
 def test_one_step_by_hand():
-    """lambda = 0, Psi = 1, R = 1, y = 3, s = 1: K = 1/2, r = 1.5, p = 1/2, and s' = 1 + (2.25 + 0.5 - 1) / 10."""
+    """lambda = 0, Psi = 1, R = 1, y = 3, s = 1: K = 1/2, r = 1.5, p = 1/2, and s' = 1 + (2.25 + 0.5
+    - 1) / 10."""
     y = np.array([[[3.0]]])
-    assert last(adaptive(linearised(model(1.0)), window=10), y).memory.scale == pytest.approx(1 + 1.75 / 10, rel=1e-14)
+    assert last(adaptive(linearised(model(1.0)), window=10), y).memory.scale == pytest.approx(
+        1 + 1.75 / 10, rel=1e-14
+    )
 
 
 def test_what_is_missing_teaches_nothing():
     y = np.array([1.0, np.nan, 2.0])[:, None, None]
     one = adaptive(linearised(model(1.0)), window=5)
-    assert last(one, y[:2]).memory.scale == last(one, y[:1]).memory.scale != last(one, y).memory.scale
+    assert (
+        last(one, y[:2]).memory.scale == last(one, y[:1]).memory.scale != last(one, y).memory.scale
+    )
 
 
 def test_its_likelihood_is_that_of_the_noise_it_believes_in():

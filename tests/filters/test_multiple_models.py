@@ -43,7 +43,9 @@ def follow(one, y):
     state, found = one.init(y.shape[1]), []
     for measurement in y:
         state = one.step(state, measurement)
-        found.append((*state.posterior, state.memory.probability, state.memory.expected, *state.predicted))
+        found.append(
+            (*state.posterior, state.memory.probability, state.memory.expected, *state.predicted)
+        )
     return [np.stack(column) for column in zip(*found, strict=True)]
 
 
@@ -51,7 +53,8 @@ def follow(one, y):
 
 
 def slow_imm(y, systems, pi, start, mean, cov):
-    """Blom and Bar-Shalom's algorithm for one trajectory, straight from the page: loops, and inverses of numbers."""
+    """Blom and Bar-Shalom's algorithm for one trajectory, straight from the page: loops, and
+    inverses of numbers."""
     modes = len(systems)
     c = list(start)
     predicted = [(np.array(mean), np.array(cov)) for _ in range(modes)]
@@ -66,21 +69,29 @@ def slow_imm(y, systems, pi, start, mean, cov):
                 K = P @ h.T @ np.linalg.inv(S)
                 corrected.append((x + K @ nu, P - K @ S @ K.T))
                 exponent = -0.5 * nu @ np.linalg.inv(S) @ nu
-                likelihood.append(math.exp(exponent) / math.sqrt((2 * math.pi) ** len(kept) * np.linalg.det(S)))
+                likelihood.append(
+                    math.exp(exponent) / math.sqrt((2 * math.pi) ** len(kept) * np.linalg.det(S))
+                )
             else:
                 corrected.append((x, P))
                 likelihood.append(1.0)
         total = sum(c[j] * likelihood[j] for j in range(modes))
         mu = [c[j] * likelihood[j] / total for j in range(modes)]
         z = sum(mu[j] * corrected[j][0] for j in range(modes))
-        p = sum(mu[j] * (corrected[j][1] + np.outer(corrected[j][0] - z, corrected[j][0] - z)) for j in range(modes))
+        p = sum(
+            mu[j] * (corrected[j][1] + np.outer(corrected[j][0] - z, corrected[j][0] - z))
+            for j in range(modes)
+        )
         found.append((z, p, np.array(mu)))
         c = [sum(pi[i][j] * mu[i] for i in range(modes)) for j in range(modes)]
         predicted = []
         for j, (A, _, Q, _) in enumerate(systems):
             weight = [pi[i][j] * mu[i] / c[j] for i in range(modes)]
             x = sum(weight[i] * corrected[i][0] for i in range(modes))
-            P = sum(weight[i] * (corrected[i][1] + np.outer(corrected[i][0] - x, corrected[i][0] - x)) for i in range(modes))
+            P = sum(
+                weight[i] * (corrected[i][1] + np.outer(corrected[i][0] - x, corrected[i][0] - x))
+                for i in range(modes)
+            )
             predicted.append((A @ x, A @ P @ A.T + Q))
     return found
 
@@ -96,7 +107,9 @@ def test_against_a_slow_loop(gaps):
     mean, cov, probability, *_ = follow(imm([linearised(m) for m in MODELS], PI, START), y)
     law = MODELS[0].prior
     for trajectory in range(y.shape[1]):
-        expected = slow_imm(y[:, trajectory], [matrices(m) for m in MODELS], PI, START, law.mean, law.cov)
+        expected = slow_imm(
+            y[:, trajectory], [matrices(m) for m in MODELS], PI, START, law.mean, law.cov
+        )
         for k, (z, p, mu) in enumerate(expected):
             np.testing.assert_allclose(mean[k, trajectory], z, rtol=0, atol=ROUNDING)
             np.testing.assert_allclose(cov[k, trajectory], p, rtol=0, atol=ROUNDING)
@@ -108,8 +121,11 @@ def test_against_a_slow_loop(gaps):
 
 def test_probabilities_sum_to_one_even_where_likelihoods_underflow():
     y = data(runs=3, steps=10)
-    y[4:] += 1e4  # hundreds of standard deviations from every mode: exp(-nu^2/2) is 0 in floating point
-    mean, cov, probability, expected, *_ = follow(imm([linearised(m) for m in MODELS], PI, START), y)
+    # hundreds of standard deviations from every mode: exp(-nu^2/2) is 0 in floating point
+    y[4:] += 1e4
+    mean, cov, probability, expected, *_ = follow(
+        imm([linearised(m) for m in MODELS], PI, START), y
+    )
     for table in (probability, expected):
         np.testing.assert_allclose(table.sum(axis=-1), 1.0, atol=1e-12)
         assert (table >= 0).all()
@@ -140,9 +156,17 @@ def test_numbers_that_are_no_probabilities_are_refused(change, message):
 def test_models_that_do_not_fit_together_are_refused():
     first = linearised(MODELS[0])
     scalar = linearised(Model.define("x + v", "x + w"))
-    other_names = linearised(Model.define(["r + s", "s + v1"], ["r + w1", "s + w2"], symbols={"x": ["r", "s"]}, prior=PRIOR))
+    other_names = linearised(
+        Model.define(
+            ["r + s", "s + v1"], ["r + w1", "s + w2"], symbols={"x": ["r", "s"]}, prior=PRIOR
+        )
+    )
     other_prior = linearised(Model.define(["x1 + x2", "x2 + v1"], ["x1 + w1", "x2 + w2"]))
-    for other, message in ((scalar, "same state"), (other_names, "same state"), (other_prior, "same prior")):
+    for other, message in (
+        (scalar, "same state"),
+        (other_names, "same state"),
+        (other_prior, "same prior"),
+    ):
         with pytest.raises(ValueError, match=message):
             imm([first, other], [[0.9, 0.1], [0.1, 0.9]])
 
@@ -158,7 +182,9 @@ def test_a_model_that_jumps_gives_the_first_probabilities_too(build):
     )
     structures = [linearised(mode) for mode in jump.modes]
     np.testing.assert_array_equal(build(structures, jump).init(2).memory.probability, [[1, 0]] * 2)
-    np.testing.assert_array_equal(build(structures, jump.transition_at).init(2).memory.probability, 0.5)
+    np.testing.assert_array_equal(
+        build(structures, jump.transition_at).init(2).memory.probability, 0.5
+    )
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
@@ -166,7 +192,9 @@ def test_what_is_no_list_of_structures_is_told(build):
     model = Model.define("x + v", "x + w")
     with pytest.raises(TypeError, match=f"^{build.__name__} expects a Structure, got Model"):
         build([model], [[1.0]])
-    with pytest.raises(TypeError, match=f"^{build.__name__} expects a list of structures, one a mode"):
+    with pytest.raises(
+        TypeError, match=f"^{build.__name__} expects a list of structures, one a mode"
+    ):
         build(linearised(model), [[1.0]])
 
 
@@ -174,5 +202,7 @@ def test_probabilities_that_are_none_at_a_later_step_are_refused():
     model = Model.define("x + v", "x + w")
     one = imm([linearised(model)] * 2, lambda k: [[0.9, 0.1], [0.1, 0.9 + 0.1 * (k == 2)]])
     run(one, np.zeros(2))
-    with pytest.raises(ValueError, match="transition must be probabilities that sum to 1 in each row"):
+    with pytest.raises(
+        ValueError, match="transition must be probabilities that sum to 1 in each row"
+    ):
         run(one, np.zeros(3))

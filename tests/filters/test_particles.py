@@ -1,4 +1,5 @@
-"""Particles against the exact filter, the Kalman filter and sums over all histories of modes, within their Monte Carlo error."""
+"""Particles against the exact filter, the Kalman filter and sums over all histories of modes,
+within their Monte Carlo error."""
 
 import math
 from itertools import product
@@ -43,7 +44,8 @@ FAULTY = moving({"sound": {}, "faulty": {"parameters": {"f": 4.0}}})
 
 
 def histories(model, y):
-    """Posterior of one trajectory, y (steps, p), by a Kalman filter for each of the J^steps histories of modes."""
+    """Posterior of one trajectory, y (steps, p), by a Kalman filter for each of the J^steps
+    histories of modes."""
     systems = [linear_system(mode) for mode in model.modes]
     logs, laws, last = [], [], []
     for modes in product(range(len(systems)), repeat=len(y)):
@@ -65,12 +67,15 @@ def histories(model, y):
     evidence = max(logs) + math.log(weights.sum())
     weights /= weights.sum()
     z = weights @ np.array([mean for mean, _ in laws])
-    cov = sum(w * (P + np.outer(mean - z, mean - z)) for w, (mean, P) in zip(weights, laws, strict=True))
+    cov = sum(
+        w * (P + np.outer(mean - z, mean - z)) for w, (mean, P) in zip(weights, laws, strict=True)
+    )
     return z, cov, np.bincount(last, weights, len(systems)), evidence
 
 
 def replicas(model, y, steps):
-    """Means, variances, modes' probabilities, stated errors and both halves of some steps: (steps, runs, REPLICAS, ...)."""
+    """Means, variances, modes' probabilities, stated errors and both halves of some steps: (steps,
+    runs, REPLICAS, ...)."""
     visited = list(states(particle(model, PARTICLES, seed=5), np.repeat(y, REPLICAS, axis=1)))[1:]
     rows = [
         (
@@ -87,10 +92,11 @@ def replicas(model, y, steps):
 
 
 def agree(sample, expected, unit):
-    """The mean over replicas (axis 2) is the expected within 5 standard errors and the bias of a ratio of sums over particles.
+    """The mean over replicas (axis 2) is the expected within 5 standard errors and the bias of a
+    ratio of sums over particles.
 
-    Five, as some hundred numbers are compared with standard errors known from 60.  The bias is a few 1/PARTICLES; "few" is
-    the particles over the effective ones, below 10 here.
+    Five, as some hundred numbers are compared with standard errors known from 60.  The bias is a
+    few 1/PARTICLES; "few" is the particles over the effective ones, below 10 here.
     """
     error, standard = sample.mean(axis=2) - expected, sample.std(axis=2, ddof=1) / np.sqrt(REPLICAS)
     np.testing.assert_array_less(np.abs(error), 5 * standard + 10 / PARTICLES * unit)
@@ -110,7 +116,10 @@ def test_of_a_scalar_model_it_is_the_exact_filter(name):
         y = y[:, np.argsort(np.abs(x[0, :, 0]))[:3]]
     visited = list(states(exact(model), y))[1:]
     right = [visited[k] for k in steps]
-    z, variance = (np.array([part(s) for s in right]) for part in (lambda s: s.posterior.mean, lambda s: s.posterior.cov[..., 0]))
+    z, variance = (
+        np.array([part(s) for s in right])
+        for part in (lambda s: s.posterior.mean, lambda s: s.posterior.cov[..., 0])
+    )
     mean, own, probability, *_ = replicas(model, y, steps)
     agree(mean, z, np.sqrt(variance))
     agree(own, variance, variance)
@@ -130,7 +139,8 @@ def test_of_a_linear_vector_model_it_is_the_kalman_filter():
 
 @pytest.mark.parametrize("model", [THROWN, FAULTY], ids=["both change", "meters"])
 def test_on_linear_modes_it_is_the_sum_over_all_histories(model):
-    """Estimates, variances, modes; the stated error is the error; the clouds' errors do not know of each other."""
+    """Estimates, variances, modes; the stated error is the error; the clouds' errors do not know of
+    each other."""
     steps = (0, 2, 5)
     y = simulate(model, 3, 6, seed=3).y
     right = [[histories(model, y[: k + 1, i])[:3] for i in range(3)] for k in steps]
@@ -142,10 +152,13 @@ def test_on_linear_modes_it_is_the_sum_over_all_histories(model):
     agree(probability, pi, 0.5)
     scale = variance.sum(axis=-1)[..., None]
     wrong = ((mean - z[:, :, None]) ** 2).sum(axis=-1) / scale
-    # 9 * 60 squares of one or two normal numbers on either side: 7 % of each, of which 4 are allowed
+    # 9 * 60 squares of one or two normal numbers on either side: 7 % of each, of which 4 are
+    # allowed
     assert (stated**2 / scale).mean() / wrong.mean() == pytest.approx(1, abs=0.35)
     products = (halves - z[:, :, None, None]).prod(axis=3).sum(axis=-1) / scale
-    assert abs(products.mean()) < 4 * products.std() / np.sqrt(products.size) + (10 / PARTICLES) ** 2
+    assert (
+        abs(products.mean()) < 4 * products.std() / np.sqrt(products.size) + (10 / PARTICLES) ** 2
+    )
 
 
 def test_the_evidence_is_that_of_all_histories():
@@ -182,10 +195,17 @@ def test_a_nonlinear_noise_of_the_object_is_admitted():
 
 def test_the_likelihood_is_the_normal_density_with_its_constant():
     x = np.array([[0.3, -1.0], [2.0, 0.5]])
-    for meter, y in ((["x1*x2 + (1 + x2**2)*w1"], [0.7]), (["x1 + 0.5*w1", "x2**2 + x1*w2 + 0.2*w1"], [0.7, -0.4])):
-        model = Model.define(["x1 + v1", "x2 + v2"], meter, meter_noise={"mean": 0.2, "variance": 1.5})
+    for meter, y in (
+        (["x1*x2 + (1 + x2**2)*w1"], [0.7]),
+        (["x1 + 0.5*w1", "x2**2 + x1*w2 + 0.2*w1"], [0.7, -0.4]),
+    ):
+        model = Model.define(
+            ["x1 + v1", "x2 + v2"], meter, meter_noise={"mean": 0.2, "variance": 1.5}
+        )
         for (a, b), value in zip(x, likelihood(model)(np.array(y), x), strict=True):
             mean, B = ([a * b], [[1 + b**2]]) if len(y) == 1 else ([a, b**2], [[0.5, 0], [0.2, a]])
             mean, B = np.array(mean), np.array(B)
-            expected = stats.multivariate_normal(mean + B @ np.full(len(B), 0.2), 1.5 * B @ B.T).logpdf(y)
+            expected = stats.multivariate_normal(
+                mean + B @ np.full(len(B), 0.2), 1.5 * B @ B.T
+            ).logpdf(y)
             assert value == pytest.approx(expected, rel=1e-12)

@@ -1,4 +1,5 @@
-"""Transitions that depend on the state: simulated, in the filters, in the exact one, and what is refused."""
+"""Transitions that depend on the state: simulated, in the filters, in the exact one, and what is
+refused."""
 
 import numpy as np
 import pytest
@@ -55,8 +56,14 @@ def test_trajectories_follow_the_state():
 
 
 def test_the_prediction_has_the_weighted_moments():
-    """lambda_j, Psi_j, c_j after one measurement, by integrals on a fine grid: exact for an affine object."""
-    model = overloaded(modes={"sound": SENSOR["sound"], "faulty": {"state": "1.2*x + 1 + 0.3*v", "parameters": {"C": 3.0}}})
+    """lambda_j, Psi_j, c_j after one measurement, by integrals on a fine grid: exact for an affine
+    object."""
+    model = overloaded(
+        modes={
+            "sound": SENSOR["sound"],
+            "faulty": {"state": "1.2*x + 1 + 0.3*v", "parameters": {"C": 3.0}},
+        }
+    )
     value, x = 1.7, np.linspace(-25, 25, 200_001)
     state = of(logic_dynamic, model).step(of(logic_dynamic, model).init(1), np.array([[value]]))
     density = []
@@ -75,13 +82,24 @@ def test_the_prediction_has_the_weighted_moments():
 
 
 def test_components_that_the_chain_does_not_contain_follow_by_regression():
-    """Against the moments of drawn states, weighted by pi(x2), for a law whose components are correlated."""
+    """Against the moments of drawn states, weighted by pi(x2), for a law whose components are
+    correlated."""
     model = JumpModel.define(
-        ["x1 + x2 + v1", "x2 + v2", "x3 + v3"], ["x1 + C*w1"], {"C": 1.0}, modes={"a": {}, "b": {"parameters": {"C": 3}}},
-        transition=[["1/(1 + exp(x2))", "1 - 1/(1 + exp(x2))"], ["0.5 + 0.4*sin(x2)", "0.5 - 0.4*sin(x2)"]], first=[0.5, 0.5],
-    )  # fmt: skip
+        ["x1 + x2 + v1", "x2 + v2", "x3 + v3"],
+        ["x1 + C*w1"],
+        {"C": 1.0},
+        modes={"a": {}, "b": {"parameters": {"C": 3}}},
+        transition=[
+            ["1/(1 + exp(x2))", "1 - 1/(1 + exp(x2))"],
+            ["0.5 + 0.4*sin(x2)", "0.5 - 0.4*sin(x2)"],
+        ],
+        first=[0.5, 0.5],
+    )
     rng, size = np.random.default_rng(1), 400_000
-    mean, root = np.array([[0.3, -0.8, 1.0]]), np.array([[1.0, 0.0, 0.0], [0.6, 0.9, 0.0], [-0.4, 0.5, 0.3]])
+    mean, root = (
+        np.array([[0.3, -0.8, 1.0]]),
+        np.array([[1.0, 0.0, 0.0], [0.6, 0.9, 0.0], [-0.4, 0.5, 0.3]]),
+    )
     nu, laws = by_state(model)(0, [Gaussian(mean, (root @ root.T)[None])] * 2)
     x = mean + rng.normal(size=(size, 3)) @ root.T
     for i, first in enumerate((1 / (1 + np.exp(x[:, 1])), 0.5 + 0.4 * np.sin(x[:, 1]))):
@@ -90,7 +108,9 @@ def test_components_that_the_chain_does_not_contain_follow_by_regression():
             law = laws[i][j]
             away = x - law.mean
             pairs = [away[:, a] for a in range(3)]
-            pairs += [away[:, a] * away[:, b] - law.cov[0, a, b] for a in range(3) for b in range(a, 3)]
+            pairs += [
+                away[:, a] * away[:, b] - law.cov[0, a, b] for a in range(3) for b in range(a, 3)
+            ]
             for part in pairs:  # M[part pi] = 0
                 assert abs((part * p).mean()) < 4 * (part * p).std() / np.sqrt(size)
 
@@ -115,7 +135,9 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
             variance = density.sum(axis=0) @ (x - z) ** 2
             assert abs(state.posterior.mean[trajectory, 0] - z) < 2e-3 * np.sqrt(variance), k
             assert abs(state.posterior.cov[trajectory, 0, 0] / variance - 1) < 4e-3, k
-            np.testing.assert_allclose(state.memory.probability[trajectory], density.sum(axis=1), atol=2e-3)
+            np.testing.assert_allclose(
+                state.memory.probability[trajectory], density.sum(axis=1), atol=2e-3
+            )
             faulty = (to_faulty * density).sum(axis=0)
             grids[trajectory] = np.stack([kernel @ (density.sum(axis=0) - faulty), kernel @ faulty])
     assert (state.memory.discretisation_error() < 1e-2).all()
@@ -124,7 +146,10 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda model: averaged(model, []), "the average over the modes: .* nobody knows the probabilities"),
+        (
+            lambda model: averaged(model, []),
+            "the average over the modes: .* nobody knows the probabilities",
+        ),
         (averaged_equations, "nobody knows the probabilities.*aof-jump-gaussian"),
         (lambda model: logic_dynamic_fos(model, []), "the logic-dynamic FOS"),
         (lambda model: model.law_at(3), "the law of the modes"),
@@ -137,7 +162,8 @@ def test_what_needs_the_law_of_the_modes_is_refused(build, message):
 
 
 def test_the_exact_filter_follows_probabilities_that_jump():
-    """Nearly as where they change within a hundredth, which a tenth of the trajectories passes on the way."""
+    """Nearly as where they change within a hundredth, which a tenth of the trajectories passes on
+    the way."""
     jump = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
     steep = overloaded([["1/(1 + exp(1000*(x - 1)))", "1 - 1/(1 + exp(1000*(x - 1)))"], [0.3, 0.7]])
     y = simulate(jump, 40, 8, seed=1).y
@@ -162,8 +188,12 @@ def test_transitions_of_many_components_are_refused():
     names = [f"x{i + 1}" for i in range(4)]
     p = "exp(-x1**2 - x2**2 - x3**2 - x4**2)"
     model = JumpModel.define(
-        [f"{name} + v" for name in names], ["x1 + C*w"], {"C": 1}, modes={"a": {}, "b": {"parameters": {"C": 2}}},
-        transition=[[p, f"1 - {p}"], [0.5, 0.5]], first=[0.5, 0.5],
-    )  # fmt: skip
+        [f"{name} + v" for name in names],
+        ["x1 + C*w"],
+        {"C": 1},
+        modes={"a": {}, "b": {"parameters": {"C": 2}}},
+        transition=[[p, f"1 - {p}"], [0.5, 0.5]],
+        first=[0.5, 0.5],
+    )
     with pytest.raises(ModelError, match="depend on 4 components"):
         of(imm, model, linearised)

@@ -1,4 +1,5 @@
-"""Models with time and known inputs: against loops typed by hand, and the Kalman filter with matrices that change."""
+"""Models with time and known inputs: against loops typed by hand, and the Kalman filter with
+matrices that change."""
 
 import math
 
@@ -40,11 +41,15 @@ U = list(oracles.Changing.U)
 
 def growth():
     return Model.define(
-        "x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", state_noise={"variance": 10}, prior={"variance": 5}
+        "x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v",
+        "x**2/20 + w",
+        state_noise={"variance": 10},
+        prior={"variance": 5},
     )
 
 
-# ---------------------------------------------------------------- linear models whose matrices change
+# ---------------------------------------------------------------- linear models whose matrices
+# change
 
 
 @pytest.mark.parametrize("name", ["changing", "scalar", "n=2, p=2, more noises", "n=1, p=2"])
@@ -59,7 +64,12 @@ def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + C @ D_w @ C.T)
         x, P = x + (y[k] - x @ H.T - C @ m_w - b) @ K.T, P - K @ H @ P
         np.testing.assert_allclose(found.mean[k], x, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(np.broadcast_to(found.cov[k], (4, *P.shape)), np.tile(P, (4, 1, 1)), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            np.broadcast_to(found.cov[k], (4, *P.shape)),
+            np.tile(P, (4, 1, 1)),
+            rtol=1e-9,
+            atol=1e-9,
+        )
         x, P = x @ A.T + B @ m_v + a, A @ P @ A.T + B @ D_v @ B.T
 
 
@@ -70,17 +80,25 @@ def test_trajectories_satisfy_the_equations_of_each_step():
     _, (m_v, D_v), (m_w, D_w) = one.laws.values()
     for k in range(STEPS - 1):
         A, B, a, H, C, b = one.at(k)
-        for left, M, mean, cov in ((x[k + 1] - x[k] @ A.T - a, B, m_v, D_v), (y[k] - x[k] @ H.T - b, C, m_w, D_w)):
+        for left, M, mean, cov in (
+            (x[k + 1] - x[k] @ A.T - a, B, m_v, D_v),
+            (y[k] - x[k] @ H.T - b, C, m_w, D_w),
+        ):
             noise, d = np.linalg.solve(M, left.T).T, np.diag(cov)
             assert (np.abs(noise.mean(axis=0) - mean) < 4 * np.sqrt(d / runs)).all()
-            assert (np.abs(np.cov(noise.T) - cov) < 4 * np.sqrt((np.outer(d, d) + cov**2) / runs)).all()
+            assert (
+                np.abs(np.cov(noise.T) - cov) < 4 * np.sqrt((np.outer(d, d) + cov**2) / runs)
+            ).all()
 
 
 def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
-    """Its prediction regresses x_{k+1} on a(z_k, m_v) of step k: a curved function, on which a wrong step is no other scale."""
+    """Its prediction regresses x_{k+1} on a(z_k, m_v) of step k: a curved function, on which a
+    wrong step is no other scale."""
     model = Model.define("0.5*x + 3*sin(x + 0.9*k) + v", "x + 0.1*k*x**2 + 0.5*w")
     x, y = (array[..., 0] for array in simulate(model, 50, 8, seed=6))
-    blocks = [Instant(*(one[:, None] for one in step)) for step in zip(x[:-1], y[:-1], x[1:], strict=True)]
+    blocks = [
+        Instant(*(one[:, None] for one in step)) for step in zip(x[:-1], y[:-1], x[1:], strict=True)
+    ]
     (filter_,) = design([duof(model)], blocks)
     found = run(filter_, y[:-1, :, None]).mean[..., 0]
     lam = np.zeros(50)
@@ -88,7 +106,8 @@ def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
         omega = y[k] - (lam + 0.1 * k * lam**2)
         (slope,), offset, _ = oracles.regression(x[k] - lam, omega)
         z = lam + slope * omega + offset
-        np.testing.assert_allclose(found[k], z, rtol=1e-9, atol=1e-11)  # 50 trajectories, regressions conditioned up to 1e3
+        # 50 trajectories, regressions conditioned up to 1e3
+        np.testing.assert_allclose(found[k], z, rtol=1e-9, atol=1e-11)
         alpha = 0.5 * z + 3 * np.sin(z + 0.9 * k)
         (slope,), offset, _ = oracles.regression(x[k + 1], alpha)
         lam = slope * alpha + offset
@@ -102,11 +121,16 @@ def test_the_growth_model_works_with_every_filter():
     model = growth()
     s, g = linearised(model), gauss_hermite(model, 10)
     filters = [aof(s), aof(unscented(model)), aof(g), iterated(s, 2), duof(model)]
-    filters += [family(g, arguments) for family in (fos, mfos) for arguments in (2, 3)] + [fos(s), mfos(s)]
+    filters += [family(g, arguments) for family in (fos, mfos) for arguments in (2, 3)] + [
+        fos(s),
+        mfos(s),
+    ]
     filters += [pointmass(model), particle(model, 300)]
     found = compare(filters, model, 112, 20, seed=1, jobs=1, progress=False)
     assert not found.left_out and set(found.names) == {one.name for one in filters}
-    extended, conditional = (found.error_variance(name).value.mean() for name in ("aof-linearised", "duof"))
+    extended, conditional = (
+        found.error_variance(name).value.mean() for name in ("aof-linearised", "duof")
+    )
     assert conditional < extended / 3  # the model's fame: linearising fails here
 
 
@@ -149,8 +173,14 @@ def test_what_jumps_with_the_step_is_a_constant_for_the_structural_functions(bui
     model = Model.define(state.format(*parts), meter.format(*parts), inputs={"u": U}, interval=15)
     mean, cov = np.array([[0.4], [-1.0]]), np.array([[[0.5]], [[1.5]]])
     for k in range(5):
-        numbers = [2 if 15 * k < 45 else 0.5, 0.5 if k == 2 else float(k > 2), np.sign(k - 1.5) * U[k]]
-        plain = build(Model.define(*(text.format(*(f"({n})" for n in numbers)) for text in (state, meter))))
+        numbers = [
+            2 if 15 * k < 45 else 0.5,
+            0.5 if k == 2 else float(k > 2),
+            np.sign(k - 1.5) * U[k],
+        ]
+        plain = build(
+            Model.define(*(text.format(*(f"({n})" for n in numbers)) for text in (state, meter)))
+        )
         now = build(model).at(k)
         for one, other in zip(
             (*now.predict(mean, cov), *now.measure(mean, cov)),
@@ -163,12 +193,19 @@ def test_what_jumps_with_the_step_is_a_constant_for_the_structural_functions(bui
 @pytest.mark.parametrize("build", [linearised, gaussian, unscented])
 def test_noise_laws_that_change_with_time_are_factors_in_the_equations(build):
     by_law = Model.define(
-        "0.9*x + x*v", "x + w",
-        {"c": 0.1}, state_noise={"mean": 0.1, "variance": "c*(1 + k/2)"}, meter_noise={"mean": 0.3, "variance": "R"},
-        inputs={"R": [1, 4, 0, 9, 1, 1, 1]}, prior={"mean": 1},
-    )  # fmt: skip
+        "0.9*x + x*v",
+        "x + w",
+        {"c": 0.1},
+        state_noise={"mean": 0.1, "variance": "c*(1 + k/2)"},
+        meter_noise={"mean": 0.3, "variance": "R"},
+        inputs={"R": [1, 4, 0, 9, 1, 1, 1]},
+        prior={"mean": 1},
+    )
     by_hand = Model.define(
-        "0.9*x + x*(0.1 + sqrt(0.1*(1 + k/2))*v)", "x + 0.3 + r*w", inputs={"r": [1, 2, 0, 3, 1, 1, 1]}, prior={"mean": 1}
+        "0.9*x + x*(0.1 + sqrt(0.1*(1 + k/2))*v)",
+        "x + 0.3 + r*w",
+        inputs={"r": [1, 2, 0, 3, 1, 1, 1]},
+        prior={"mean": 1},
     )
     y = simulate(by_law, 4, 7, seed=9).y
     for one, other in zip(run(aof(build(by_law)), y), run(aof(build(by_hand)), y), strict=True):
@@ -186,7 +223,10 @@ def test_what_is_printed_names_the_step():
     model = Model.define("x + u*v + t", "x + w", inputs={"u": U}, interval=0.5)
     assert repr(model).endswith("inputs u (10 values))")
     text = model.latex()
-    assert r"t &= \frac{k}{2}" in text and r"u_0, u_1, \ldots &= 0.7, -2, 3, 0, 1.5, -1, \ldots" in text
+    assert (
+        r"t &= \frac{k}{2}" in text
+        and r"u_0, u_1, \ldots &= 0.7, -2, 3, 0, 1.5, -1, \ldots" in text
+    )
     assert r"\tau(z, p, k) &= " in linearised(model).latex()
     x, k, u = sp.Symbol("z", real=True), sp.Symbol("t", real=True), sp.Symbol("u", real=True)
     assert linearised(model)["tau"] == x + k and linearised(model)["Theta"].coeff(u, 2) == 1
@@ -196,14 +236,30 @@ def test_what_is_printed_names_the_step():
     ("options", "error", "message"),
     [
         ({"inputs": {"u": []}}, ModelError, "input u must be a list of finite numbers"),
-        ({"inputs": {"u": [1, float("nan")]}}, ModelError, "input u must be a list of finite numbers"),
+        (
+            {"inputs": {"u": [1, float("nan")]}},
+            ModelError,
+            "input u must be a list of finite numbers",
+        ),
         ({"inputs": {"x": [1]}}, ModelError, "x named twice: state, noises, parameters and inputs"),
         ({"inputs": {"sin": [1]}}, ModelError, "already means a function"),
         ({"inputs": [1, 2]}, ModelError, "`inputs` must be a table"),
         ({"interval": 0}, ModelError, "interval between two steps must be positive"),
-        ({"state_noise": {"variance": "x"}}, FormulaError, "unknown symbol 'x'; known here: k, pi, t"),
-        ({"state_noise": {"variance": [["k"]]}}, ModelError, "write correlated noises that change with time into the equation"),
-        ({"state_noise": {"variance": ["k", 1]}}, ModelError, r"2 variances and 1 means for 1 noise\(s\)"),
+        (
+            {"state_noise": {"variance": "x"}},
+            FormulaError,
+            "unknown symbol 'x'; known here: k, pi, t",
+        ),
+        (
+            {"state_noise": {"variance": [["k"]]}},
+            ModelError,
+            "write correlated noises that change with time into the equation",
+        ),
+        (
+            {"state_noise": {"variance": ["k", 1]}},
+            ModelError,
+            r"2 variances and 1 means for 1 noise\(s\)",
+        ),
         ({"prior": {"variance": "k"}}, ModelError, "`prior`: mean and variance must be numbers"),
     ],
 )
@@ -237,7 +293,10 @@ def test_an_input_that_ends_too_soon_is_named():
         lambda: run(kalman_filter(model), np.zeros((4, 1, 1))),
         lambda: run(pointmass(model), np.zeros((4, 1, 1))),
     ):
-        with pytest.raises(ModelError, match=r"input u has 3 value\(s\), for the steps 0 to 2, but step 3 needs one"):
+        with pytest.raises(
+            ModelError,
+            match=r"input u has 3 value\(s\), for the steps 0 to 2, but step 3 needs one",
+        ):
             use()
     assert simulate(model, 2, 3, seed=1).x.shape == (3, 2, 1)
 
@@ -265,8 +324,18 @@ def with_meter(formula):
     return Model.define("0.9*x + 0.3*v", f"{formula} + 0.5*w", prior={"mean": 0.4})
 
 
-SMOOTH_ENOUGH = {"Abs(x)": -1.0, "(x if x < 1 else 1)": 1.0, "Piecewise((x, x < 1), (2*x - 1, True))": 1.0, "x*Abs(x)": 1.4}
-JUMPS = ["sign(x)", "Heaviside(x - 1)", "(x if x < 1 else 2)", "Piecewise((x, x < 1), (x**2, x < 2), (1, True))"]
+SMOOTH_ENOUGH = {
+    "Abs(x)": -1.0,
+    "(x if x < 1 else 1)": 1.0,
+    "Piecewise((x, x < 1), (2*x - 1, True))": 1.0,
+    "x*Abs(x)": 1.4,
+}
+JUMPS = [
+    "sign(x)",
+    "Heaviside(x - 1)",
+    "(x if x < 1 else 2)",
+    "Piecewise((x, x < 1), (x**2, x < 2), (1, True))",
+]
 
 
 @pytest.mark.parametrize(("formula", "slope"), SMOOTH_ENOUGH.items())
@@ -300,7 +369,8 @@ def test_the_reason_is_told_in_the_formulas_of_the_model():
     ],
 )
 def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
-    """Derivatives of 1 if v > 0 else -1 are 0 almost everywhere, but it is not a constant, and no filter may take it for one."""
+    """Derivatives of 1 if v > 0 else -1 are 0 almost everywhere, but it is not a constant, and no
+    filter may take it for one."""
     model = Model.define(state, meter)
     assert not is_linear(model)
     for refuses in (kalman_filter, linearised, gaussian):
@@ -313,24 +383,39 @@ def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
             pointmass(model)
     x, y = simulate(model, 200_000, 2, seed=1)
     mean, variance = model.prior.mean, model.prior.cov
-    found = gauss_hermite(model, 60)  # the error of a rule at a jump is the weight of a point, 0.05 at most here
+    # the error of a rule at a jump is the weight of a point, 0.05 at most here
+    found = gauss_hermite(model, 60)
     tau, theta = found.predict(mean, variance)
     h, _, F, _ = found.measure(mean, variance)
-    for moment, sample in ((tau, x[1].mean()), (theta, x[1].var()), (h, y[0].mean()), (F, y[0].var())):
+    for moment, sample in (
+        (tau, x[1].mean()),
+        (theta, x[1].var()),
+        (h, y[0].mean()),
+        (F, y[0].var()),
+    ):
         assert np.squeeze(moment) == pytest.approx(sample, abs=0.15)
 
 
 @pytest.mark.parametrize("build", [linearised, gaussian, unscented])
 def test_a_choice_between_noises_by_the_step_is_one_of_constants(build):
-    chosen = Model.define("0.9*x + (2*v if k < 2 else x*v)", "x + (w if 1 <= k < 3 else 3*w + x**2)")
+    chosen = Model.define(
+        "0.9*x + (2*v if k < 2 else x*v)", "x + (w if 1 <= k < 3 else 3*w + x**2)"
+    )
     for k in range(4):
-        plain = build(Model.define("0.9*x + " + ("2*v" if k < 2 else "x*v"), "x + " + ("w" if 1 <= k < 3 else "3*w + x**2")))
+        plain = build(
+            Model.define(
+                "0.9*x + " + ("2*v" if k < 2 else "x*v"),
+                "x + " + ("w" if 1 <= k < 3 else "3*w + x**2"),
+            )
+        )
         law = np.array([[0.3]]), np.array([[[0.7]]])
         now = build(chosen).at(k)
         if build is unscented:  # a noise that is only added at some steps gets points at all
             np.testing.assert_allclose(now.predict(*law).mean, plain.predict(*law).mean, rtol=1e-12)
             continue
         for one, other in zip(
-            (*now.predict(*law), *now.measure(*law)), (*plain.predict(*law), *plain.measure(*law)), strict=True
+            (*now.predict(*law), *now.measure(*law)),
+            (*plain.predict(*law), *plain.measure(*law)),
+            strict=True,
         ):
             np.testing.assert_allclose(*np.broadcast_arrays(one, other), rtol=1e-12, atol=1e-14)

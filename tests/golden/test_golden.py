@@ -1,8 +1,9 @@
 """The net: numbers and formulas that must stay when code is rewritten, as they were before.
 
-`golden.json` was written once, by `python tests/golden/test_golden.py` (this file), with the code of version 0.2.0; whoever
-changes a number on purpose writes its part anew and says why.  Measurements are stored with the results, so that a simulator may
-change; ensembles for designs are drawn here.
+`golden.json` was written once, by `python tests/golden/test_golden.py` (this file), with the code
+of version 0.2.0; whoever changes a number on purpose writes its part anew and says why.
+Measurements are stored with the results, so that a simulator may change; ensembles for designs are
+drawn here.
 """
 
 import json
@@ -29,7 +30,19 @@ from kfcourse.symbolic.structure import gaussian, linearised
 
 PATH = Path(__file__).with_name("golden.json")
 STEPS, RUNS = 6, 3
-NAMES = [*load_variants(), "D1", "D2", "D3", "J1", "J1-lasting", "J1-overload", "J2", "J-switching", "J3", "J4"]
+NAMES = [
+    *load_variants(),
+    "D1",
+    "D2",
+    "D3",
+    "J1",
+    "J1-lasting",
+    "J1-overload",
+    "J2",
+    "J-switching",
+    "J3",
+    "J4",
+]
 VARIANTS = {name: find_variant(name).model for name in NAMES}
 PLAIN = {name: model for name, model in VARIANTS.items() if not isinstance(model, JumpModel)}
 JUMPS = {name: model for name, model in VARIANTS.items() if isinstance(model, JumpModel)}
@@ -39,7 +52,8 @@ COMPARED = ("53", "5", "20")
 
 
 def laws(n: int, count: int = 20) -> tuple[np.ndarray, np.ndarray]:
-    """Means (count, n) near the origin and covariances (count, n, n) of all sizes, for a look at structural functions."""
+    """Means (count, n) near the origin and covariances (count, n, n) of all sizes, for a look at
+    structural functions."""
     rng = np.random.default_rng(53)
     roots = rng.standard_normal((count, n, n)) * np.exp(rng.uniform(-2, 0.5, (count, 1, 1)))
     return rng.standard_normal((count, n)), roots @ np.swapaxes(roots, -1, -2) + 1e-3 * np.eye(n)
@@ -49,7 +63,9 @@ def laws(n: int, count: int = 20) -> tuple[np.ndarray, np.ndarray]:
 def measurements(name: str) -> np.ndarray:
     """The stored record (STEPS, RUNS, p) of a variant; drawn where there is none yet."""
     known = stored().get(f"record {name}")
-    return simulate(VARIANTS[name], RUNS, STEPS, seed=1).y if known is None else np.array(known["y"])
+    return (
+        simulate(VARIANTS[name], RUNS, STEPS, seed=1).y if known is None else np.array(known["y"])
+    )
 
 
 @cache
@@ -57,7 +73,9 @@ def drawn(name: str, runs: int = 2000) -> list[Instant]:
     """The trajectories of a variant on which its filters are designed."""
     model, rng = VARIANTS[name], np.random.default_rng(1)
     state, meter = (
-        sp.lambdify([*model.x, *noises, *model.known.symbols], list(equation.subs(model.values)), "numpy")
+        sp.lambdify(
+            [*model.x, *noises, *model.known.symbols], list(equation.subs(model.values)), "numpy"
+        )
         for equation, noises in ((model.state_equation, model.v), (model.meter_equation, model.w))
     )
 
@@ -71,7 +89,10 @@ def drawn(name: str, runs: int = 2000) -> list[Instant]:
 
     x, instants = draw(model.prior), []
     for k in range(STEPS):
-        y, x_next = evaluate(meter, x, draw(model.meter_noise), k), evaluate(state, x, draw(model.state_noise), k)
+        y, x_next = (
+            evaluate(meter, x, draw(model.meter_noise), k),
+            evaluate(state, x, draw(model.state_noise), k),
+        )
         instants.append(Instant(x, y, x_next))
         x = x_next
     return instants
@@ -100,7 +121,8 @@ def structures(name):
 
 
 def filters(name):
-    """Estimates and variances of every filter, after the last two measurements; designed where they must be."""
+    """Estimates and variances of every filter, after the last two measurements; designed where they
+    must be."""
     model, values = VARIANTS[name], {}
     for short in FILTERS:
         if short in ("aof-exact", "particle"):
@@ -133,7 +155,11 @@ def looking_back(name):
     """Smoother and likelihood of the extended Kalman filter."""
     ekf = aof(linearised(PLAIN[name]))
     smoothed = smooth(ekf, measurements(name))
-    return {"mean": smoothed.mean, "cov": smoothed.cov, "likelihood": likelihood(ekf, measurements(name))}
+    return {
+        "mean": smoothed.mean,
+        "cov": smoothed.cov,
+        "likelihood": likelihood(ekf, measurements(name)),
+    }
 
 
 def exact(name):
@@ -163,16 +189,17 @@ def equations(_):
 PARTS = {
     "record": (record, VARIANTS, 0.0),
     "structures": (structures, PLAIN, 1e-10),
-    "filters": (filters, PLAIN, 1e-8),  # regressions on windows of measurements lose some eight of sixteen digits
+    # regressions on windows of measurements lose some eight of sixteen digits
+    "filters": (filters, PLAIN, 1e-8),
     "modes": (modes, JUMPS, 1e-9),
     "looking_back": (looking_back, PLAIN, 1e-9),
     "exact": (exact, SCALAR, 3e-3),
     "comparison": (comparison, COMPARED, 3.0),
     "equations": (equations, ["all"], 0.0),
 }
-# Four estimates of an object without noise tell one another to fifteen digits: measurements changed by 1e-15 move the filter by
-# 2e-5, and its covariance by half a hundredth.  The Gaussian functions of the lander with a fault are quadratures, whose points
-# are chosen for 1e-5 deviations.
+# Four estimates of an object without noise tell one another to fifteen digits: measurements changed
+# by 1e-15 move the filter by 2e-5, and its covariance by half a hundredth.  The Gaussian functions
+# of the lander with a fault are quadratures, whose points are chosen for 1e-5 deviations.
 LOOSE = {("filters D3", "fbp4-linearised"): 0.02}
 LOOSE |= {("modes J3", name): 1e-4 for name in ("aof-jump-gaussian", "imm", "gpb2", "aof-averaged")}
 CASES = [f"{part} {name}" for part, (_, names, _) in PARTS.items() for name in names]
@@ -194,16 +221,21 @@ def test_what_was_so_is_so(case):
             assert values[key] == before, key
             continue
         now, before = np.asarray(values[key], dtype=float), np.array(before, dtype=float)
-        if part == "comparison":  # (error variance, standard error), of other trajectories than then
+        # (error variance, standard error), of other trajectories than then
+        if part == "comparison":
             assert np.all(abs(now[0] - before[0]) < tolerance * np.hypot(now[1], before[1])), key
             continue
         scale = before_deviation(expected, key) if part == "exact" else size_of(before, key)
         tolerance = LOOSE.get((case, key.split()[0]), PARTS[part][2])
-        assert np.all(abs(now - before) <= tolerance * scale + 1e-300), (key, np.max(abs(now - before) / (scale + 1e-300)))
+        assert np.all(abs(now - before) <= tolerance * scale + 1e-300), (
+            key,
+            np.max(abs(now - before) / (scale + 1e-300)),
+        )
 
 
 def size_of(before, key):
-    """Units of rounding: deviations for covariances, else the number itself or a part of the largest."""
+    """Units of rounding: deviations for covariances, else the number itself or a part of the
+    largest."""
     if key.endswith("cov"):
         deviation = np.sqrt(np.diagonal(before, axis1=-2, axis2=-1))
         return deviation[..., :, None] * deviation[..., None, :]
@@ -231,5 +263,7 @@ if __name__ == "__main__":
         part, _, name = case.partition(" ")
         written[case] = {key: rounded(value) for key, value in PARTS[part][0](name).items()}
         print(case, flush=True)
-    lines = [f"{json.dumps(case)}: {json.dumps(written[case])}" for case in CASES if case in written]
+    lines = [
+        f"{json.dumps(case)}: {json.dumps(written[case])}" for case in CASES if case in written
+    ]
     PATH.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")

@@ -1,4 +1,5 @@
-"""Which filter may I use?  Refusals and warnings against what is known of the models, and the lab without the refused."""
+"""Which filter may I use?  Refusals and warnings against what is known of the models, and the lab
+without the refused."""
 
 import re
 import warnings
@@ -37,35 +38,53 @@ def test_variant_53_warns_of_points_on_the_axes(variant53):
     """UKF: x^2 w is 0 on both axes, so nothing of f^2 3 d^2 is seen."""
     found = verdicts(variant53)
     assert kinds(found, "no") == set() and kinds(found, "poor") == {"aof-unscented"}
-    assert "see 0 % of the variance of the measurement that the state does not explain" in found["aof-unscented"].says
+    assert (
+        "see 0 % of the variance of the measurement that the state does not explain"
+        in found["aof-unscented"].says
+    )
     assert found["particle"].says == found["aof-exact"].says == ""
 
 
 def test_what_has_no_closed_form_no_derivative_or_several_components_is_refused_with_the_reason():
     found = verdicts(Model.define("0.9*x + v", "tan(x)/10 + w", prior={"variance": 0.01}))
     gaussians = {name for name in FILTERS if name.endswith("gaussian")}
-    assert kinds(found, "no") == gaussians and "no closed-form Gaussian mean of the term tan(x)" in found["aof-gaussian"].says
+    assert (
+        kinds(found, "no") == gaussians
+        and "no closed-form Gaussian mean of the term tan(x)" in found["aof-gaussian"].says
+    )
 
     found = verdicts(Model.define("0.9*x + v", "sign(x) + w"))
-    assert kinds(found, "no") == gaussians | {name for name in FILTERS if name.endswith("linearised")}
+    assert kinds(found, "no") == gaussians | {
+        name for name in FILTERS if name.endswith("linearised")
+    }
     assert "not differentiable" in found["aof-linearised"].says
     assert found["aof-exact"].verdict == "yes"
     assert found["duof"].verdict == "yes"
 
     with_noise = verdicts(Model.define(["x1 + 0.1*x2", "x2 + v1"], "x1 + w1"))
-    without = verdicts(Model.define(["x1 + 0.1*x2", "x2 + v1"], "x1", symbols={"x": ["x1", "x2"], "v": ["v1"]}))
+    without = verdicts(
+        Model.define(["x1 + 0.1*x2", "x2 + v1"], "x1", symbols={"x": ["x1", "x2"], "v": ["v1"]})
+    )
     assert kinds(with_noise, "no") == set() and kinds(without, "no") == {"aof-exact", "particle"}
     assert "no noise enters the meter" in without["aof-exact"].says
 
     found = verdicts(Model.define("0.9*x + v", "x + w + w**2"))
-    assert kinds(found, "no") == {"aof-exact", "particle"} and "enters nonlinearly" in found["particle"].says
+    assert (
+        kinds(found, "no") == {"aof-exact", "particle"}
+        and "enters nonlinearly" in found["particle"].says
+    )
 
 
 def test_what_can_be_built_and_will_not_do_is_warned_of():
     found = verdicts(Model.define("0.9*x + v", "x**2 + w"))
     level = {name for name in FILTERS if name.endswith("linearised")}
-    assert level <= kinds(found, "poor") and "tangent of y at the prior's mean is level" in found["fos3-linearised"].says
-    growth = Model.define("x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", prior={"variance": 5})
+    assert (
+        level <= kinds(found, "poor")
+        and "tangent of y at the prior's mean is level" in found["fos3-linearised"].says
+    )
+    growth = Model.define(
+        "x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", prior={"variance": 5}
+    )
     assert "with 5 points an axis" in verdicts(growth)["aof-gauss-hermite"].says
 
 
@@ -74,13 +93,18 @@ def test_what_can_be_built_and_will_not_do_is_warned_of():
     [("53", "aof-gaussian,duof", FILTERS), ("J1", "imm,aof-jump-gaussian,duof", JUMP_FILTERS)],
 )
 def test_the_lab_looks_at_each_filter_once(variant, filters, all_of_them, tmp_path, monkeypatch):
-    """Those compared, then the others for the report's table; the report and its modes take what is there."""
+    """Those compared, then the others for the report's table; the report and its modes take what is
+    there."""
     looked, look = [], admission._admitted
-    monkeypatch.setattr(admission, "_admitted", lambda name, *more: looked.append(name) or look(name, *more))
+    monkeypatch.setattr(
+        admission, "_admitted", lambda name, *more: looked.append(name) or look(name, *more)
+    )
     few = ["--runs", "40", "--steps", "2", "--report", "en", "--out", str(tmp_path)]
     result = CliRunner().invoke(cli.main, ["lab", variant, "--filters", filters, *few])
     assert result.exit_code == 0, result.output
-    assert looked[: filters.count(",") + 1] == filters.split(",") and sorted(looked) == sorted(all_of_them)
+    assert looked[: filters.count(",") + 1] == filters.split(",") and sorted(looked) == sorted(
+        all_of_them
+    )
     assert (tmp_path / "modes.svg").exists() == (variant == "J1")
 
 
@@ -89,7 +113,9 @@ def test_formulas_that_were_not_derived_in_time_are_not_derived_again():
     known = admissions(model, ["aof-gaussian"], seconds=0.01)
     found = admissions(model, ["fos-gaussian", "aof-gaussian", "duof"], seconds=60, known=known)
     assert [one.name for one in found] == ["fos-gaussian", "aof-gaussian", "duof"]
-    assert [one.reason for one in found] == [known[0].reason] * 2 + [""] and "within 0.01 s" in str(known[0].reason)
+    assert [one.reason for one in found] == [known[0].reason] * 2 + [""] and "within 0.01 s" in str(
+        known[0].reason
+    )
 
 
 def test_an_unknown_filter_is_refused():
@@ -120,11 +146,24 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
 
     size, options = (model, 300, 4, 1), {"jobs": 1, "progress": False}
     good = [duof(model), aof(gaussian(model))]
-    found = without_failing([broken("one"), good[0], broken("two"), good[1]], *size, left_out={"aof-exact": "reason"}, **options)
-    assert found.names == ("duof", "aof-gaussian") and list(found.left_out) == ["aof-exact", "one", "two"]
-    assert "one became infinite or NaN" in str(found.left_out["one"]) and found.left_out["one"].kind == "infinite"
+    found = without_failing(
+        [broken("one"), good[0], broken("two"), good[1]],
+        *size,
+        left_out={"aof-exact": "reason"},
+        **options,
+    )
+    assert found.names == ("duof", "aof-gaussian") and list(found.left_out) == [
+        "aof-exact",
+        "one",
+        "two",
+    ]
+    assert (
+        "one became infinite or NaN" in str(found.left_out["one"])
+        and found.left_out["one"].kind == "infinite"
+    )
     np.testing.assert_array_equal(
-        found.error_variance("duof").value, compare(good, *size, **options).error_variance("duof").value
+        found.error_variance("duof").value,
+        compare(good, *size, **options).error_variance("duof").value,
     )
     with pytest.raises(NotFinite, match="every filter fails"):
         without_failing([broken("two")], *size, **options)
@@ -135,7 +174,8 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
 
 
 def test_a_negative_variance_is_the_affair_of_its_filter():
-    """The Gaussian formulas of this meter cancel in doubles; the other filters are compared as if it were not there."""
+    """The Gaussian formulas of this meter cancel in doubles; the other filters are compared as if
+    it were not there."""
     model = Model.define("0.9*x + 0.1*v", "(1 + x)**16*(1 + x)**8 + w")
 
     size, options = (model, 500, 40, 1), {"jobs": 1, "progress": False}
@@ -151,9 +191,12 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
 
 
-@pytest.mark.parametrize("meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]])
+@pytest.mark.parametrize(
+    "meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]]
+)
 def test_measurements_whose_noises_depend_on_one_another_have_no_density(meter):
-    """Two equal rows, and sums of rows: particles would meet a singular matrix; the Gaussian filters take the pseudo-inverse."""
+    """Two equal rows, and sums of rows: particles would meet a singular matrix; the Gaussian
+    filters take the pseudo-inverse."""
     model = Model.define("0.9*x + v", meter)
     particles, normal = admissions(model, ["particle", "aof-gaussian"])
     assert particles.built is None and "depend on one another" in str(particles.reason)

@@ -29,7 +29,9 @@ def test_leaders_are_those_not_significantly_worse_than_the_best(found):
     several = 0
     for k in range(result.steps):
         best, *others = result.leaders(k)
-        assert result.gap(best).value[k] == min(result.gap(name).value[k] for name in result.entrants)
+        assert result.gap(best).value[k] == min(
+            result.gap(name).value[k] for name in result.entrants
+        )
         several += bool(others)
         for name in set(result.entrants) - {best}:
             low, _ = result.gap_difference(name, best)[k].interval(0.95)
@@ -39,7 +41,8 @@ def test_leaders_are_those_not_significantly_worse_than_the_best(found):
 
 
 def test_where_the_meter_is_poor_and_the_object_quiet_the_duof_leads(found):
-    """The lab's conclusion is turned round; by how much: the GAOF is 100 % above the bound, the DUOF 10 %."""
+    """The lab's conclusion is turned round; by how much: the GAOF is 100 % above the bound, the
+    DUOF 10 %."""
     assert found[0.02, 0.05].leaders(2) == ["duof"]
     assert "duof" not in found[0.05, 0.02].leaders(2)[:1]
 
@@ -52,9 +55,13 @@ def test_the_map_is_drawn(found):
     for text, result in zip(texts, found.cells.values(), strict=True):
         best, *others = result.leaders(2)
         assert text.startswith(title(best) + (f", {len(others)} more\n" if others else "\n"))
-        value, error = (float(number) for number in text.splitlines()[1].removesuffix(" %").split(" ± "))
+        value, error = (
+            float(number) for number in text.splitlines()[1].removesuffix(" %").split(" ± ")
+        )
         gap = result.gap(best)[2]
-        assert abs(value - 100 * gap.value) <= 0.05 * error and error == pytest.approx(100 * gap.standard_error, rel=0.05)
+        assert abs(value - 100 * gap.value) <= 0.05 * error and error == pytest.approx(
+            100 * gap.standard_error, rel=0.05
+        )
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$f$", "$e$")
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["0.02", "0.05"]
     np.testing.assert_array_equal(ax.get_xlim(), (-0.5, 1.5))

@@ -1,4 +1,5 @@
-"""`kfcourse estimate`: a file of measurements, a model, and what comes out; nothing half-written."""
+"""`kfcourse estimate`: a file of measurements, a model, and what comes out; nothing
+half-written."""
 
 import csv
 import re
@@ -56,8 +57,13 @@ def practitioner_s_track(seed):
 
 
 def written(path, times, y):
-    cells = (",".join("" if np.isnan(one) else f"{one:.6f}" for one in (t, *row)) for t, row in zip(times, y, strict=True))
-    path.write_text("\n".join(["time,y1,y2" if y.shape[1] == 2 else "time,y", *cells]), encoding="utf-8")
+    cells = (
+        ",".join("" if np.isnan(one) else f"{one:.6f}" for one in (t, *row))
+        for t, row in zip(times, y, strict=True)
+    )
+    path.write_text(
+        "\n".join(["time,y1,y2" if y.shape[1] == 2 else "time,y", *cells]), encoding="utf-8"
+    )
 
 
 @pytest.fixture
@@ -84,7 +90,8 @@ def numbers(path):
 
 
 def test_the_practitioner_s_track(place):
-    """Raw, without a gate, gated, smoothed: each step brings what it brings a practitioner who writes the loop by hand."""
+    """Raw, without a gate, gated, smoothed: each step brings what it brings a practitioner who
+    writes the loop by hand."""
     times, x, y = practitioner_s_track(2)
     written(place / "track.csv", times, y)
     variant = model_of(place / "my.toml", "plane")
@@ -93,7 +100,9 @@ def test_the_practitioner_s_track(place):
         return np.sqrt(np.mean(np.sum((law[..., :2] - x[:, :2]) ** 2, axis=-1)))
 
     raw = np.sqrt(np.nanmean(np.sum((y - x[:, :2]) ** 2, axis=-1)))
-    plain, behind = (estimate_record(place / "track.csv", variant, gate=gate).examined for gate in (None, 0.999))
+    plain, behind = (
+        estimate_record(place / "track.csv", variant, gate=gate).examined for gate in (None, 0.999)
+    )
     assert 10 < raw < 20
     assert 2 * error(behind.estimate.mean[:, 0]) < error(plain.estimate.mean[:, 0]) < raw
     assert error(behind.estimate.mean[:, 0]) < 2.4 and error(behind.smoothed.mean[:, 0]) < 1.5
@@ -108,9 +117,25 @@ def test_the_practitioner_s_track(place):
 def test_the_command_writes_numbers_and_a_report(call, place):
     times, _, y = practitioner_s_track(3)
     written(place / "track.csv", times[:60], y[:60])
-    result = call("track.csv", "--model", "my.toml", "--variant", "plane", "--gate", 0.999, "--track", "x,z", "--out", "out")
+    result = call(
+        "track.csv",
+        "--model",
+        "my.toml",
+        "--variant",
+        "plane",
+        "--gate",
+        0.999,
+        "--track",
+        "x,z",
+        "--out",
+        "out",
+    )
     assert result.exit_code == 0, result.output
-    assert "60 rows, " in result.output and "The gate refused" in result.output and "Report: out/report.html" in result.output
+    assert (
+        "60 rows, " in result.output
+        and "The gate refused" in result.output
+        and "Report: out/report.html" in result.output
+    )
     told = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"), gate=0.999)
     table = numbers(place / "out" / "estimate.csv")
     assert len(table) == 1 + 4 * 4 + 2 * 2 + 2
@@ -123,11 +148,16 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         ("weight", told.examined.weight[:, 0]),
         ("log_likelihood", told.examined.log_likelihood[:, 0]),
     ):
-        np.testing.assert_allclose(table[name], column, rtol=1e-6, atol=1e-6)  # the file of measurements has six decimals
+        # the file of measurements has six decimals
+        np.testing.assert_allclose(table[name], column, rtol=1e-6, atol=1e-6)
     html = (place / "out" / "report.html").read_text(encoding="utf-8")
     images = re.findall(r'<img src="([^"]+)" alt="([^"]+)"', html)
-    assert len(images) == 1 + 4 + 2 * 2 and all((place / "out" / name).is_file() for name, _ in images)
-    assert "<math" in html and "<b>" not in html and "a walk &lt;b&gt;in&lt;/b&gt; the plane" in html
+    assert len(images) == 1 + 4 + 2 * 2 and all(
+        (place / "out" / name).is_file() for name, _ in images
+    )
+    assert (
+        "<math" in html and "<b>" not in html and "a walk &lt;b&gt;in&lt;/b&gt; the plane" in html
+    )
     assert not re.search(r"""(src|href)\s*=\s*["']?\s*(https?:)?//""", html)
     for sentence in told.says():
         assert sentence.split(":")[0] in html
@@ -138,7 +168,17 @@ def test_times_keep_all_their_digits_and_a_gate_may_judge_components(call, place
     stamps = [1484649904.25 + 0.5 * k for k in range(6)]
     rows = [f"{stamp},{1 + k % 2},{1e3 if k == 3 else 1}" for k, stamp in enumerate(stamps)]
     (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows]))
-    arguments = ("stamps.csv", "--model", "my.toml", "--variant", "plane", "--gate", "0.999", "--out", "out")
+    arguments = (
+        "stamps.csv",
+        "--model",
+        "my.toml",
+        "--variant",
+        "plane",
+        "--gate",
+        "0.999",
+        "--out",
+        "out",
+    )
     assert "refused 1 of 6 measurements: rows 4" in call(*arguments, "--by-component").output
     table = numbers(place / "out" / "estimate.csv")
     np.testing.assert_array_equal(table["time"], stamps)
@@ -158,14 +198,25 @@ def test_unknown_parameters_are_found_first(call, place):
     times, _, y = practitioner_s_track(4)
     written(place / "line.csv", times, y[:, :1])
     (place / "mine.toml").write_text(
-        '[variants.walk]\nstate = "x + sqrt(q*dt)*v"\nmeter = "x + sqrt(r)*w"\nparameters = { q = 100, r = 100 }\n'
+        '[variants.walk]\nstate = "x + sqrt(q*dt)*v"\nmeter = "x + sqrt(r)*w"\nparameters = { q = '
+        "100, r = 100 }\n"
         "inputs = { dt = [1] }\nprior = { mean = 0, variance = 1e4 }\n"
     )
     result = call("line.csv", "--model", "mine.toml", "--unknown", "q,r", "--positive", "q, r")
     assert result.exit_code == 0, result.output
-    found = {name: float(value) for name, value in re.findall(r"^(q|r) = (\S+) ±", result.output, re.MULTILINE)}
-    told = estimate_record(place / "line.csv", model_of(place / "mine.toml", None), unknown=["q", "r"], positive=["q", "r"])
-    assert found == pytest.approx(dict(zip(told.likeliest.names, told.likeliest.value, strict=True)), rel=1e-3)
+    found = {
+        name: float(value)
+        for name, value in re.findall(r"^(q|r) = (\S+) ±", result.output, re.MULTILINE)
+    }
+    told = estimate_record(
+        place / "line.csv",
+        model_of(place / "mine.toml", None),
+        unknown=["q", "r"],
+        positive=["q", "r"],
+    )
+    assert found == pytest.approx(
+        dict(zip(told.likeliest.names, told.likeliest.value, strict=True)), rel=1e-3
+    )
     assert (place / "estimate-line" / "estimate.csv").is_file()
     unfit = call("line.csv", "--model", "mine.toml", "--unknown", "x")
     assert unfit.exit_code == 1 and "unknown must name parameters" in unfit.output
@@ -173,34 +224,65 @@ def test_unknown_parameters_are_found_first(call, place):
 
 @pytest.mark.parametrize("structure", [*own_data.STRUCTURES])
 def test_every_filter_of_the_option(place, structure):
-    told = estimate_record(place / "line.csv", model_of(place / "my.toml", "line"), structure=structure)
+    told = estimate_record(
+        place / "line.csv", model_of(place / "my.toml", "line"), structure=structure
+    )
     expected = estimate_record(place / "line.csv", model_of(place / "my.toml", "line"))
-    np.testing.assert_allclose(told.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9)  # a linear model
-    assert told.record.model == Model.define("x + dt*v", "x + w", inputs={"dt": [0.5, 1.5, 0.5, 0.5, 0.5]})
+    # a linear model
+    np.testing.assert_allclose(
+        told.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9
+    )
+    assert told.record.model == Model.define(
+        "x + dt*v", "x + w", inputs={"dt": [0.5, 1.5, 0.5, 0.5, 0.5]}
+    )
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["missing.csv", "--model", "my.toml", "--variant", "line"], 1, ["no file of measurements at missing.csv"]),
+        (
+            ["missing.csv", "--model", "my.toml", "--variant", "line"],
+            1,
+            ["no file of measurements at missing.csv"],
+        ),
         (["line.csv", "--model", "missing.toml"], 1, ["no file of variants at missing.toml"]),
         (["line.csv"], 2, ["--model"]),
         (["line.csv", "--model", "my.toml"], 1, ["3 models; say which", "--variant plane"]),
         (["line.csv", "--model", "my.toml", "--variant", "circle"], 1, ["circle"]),
         (["line.csv", "--model", "my.toml", "--variant", "plane"], 1, ["no column 'y1'"]),
         (["line.csv", "--model", "my.toml", "--variant", "line", "--gate", "1"], 2, ["--gate"]),
-        (["line.csv", "--model", "my.toml", "--variant", "line", "--filter", "magic"], 2, ["magic"]),
+        (
+            ["line.csv", "--model", "my.toml", "--variant", "line", "--filter", "magic"],
+            2,
+            ["magic"],
+        ),
         (["line.csv", "--model", "my.toml", "--variant", "line", "--column", "y"], 2, ["--column"]),
-        (["line.csv", "--model", "my.toml", "--variant", "line", "--track", "x,q"], 2, ["there are x"]),
+        (
+            ["line.csv", "--model", "my.toml", "--variant", "line", "--track", "x,q"],
+            2,
+            ["there are x"],
+        ),
         (["bad.csv", "--model", "my.toml", "--variant", "line"], 1, ["bad.csv, line 3, column y"]),
-        (["wild.csv", "--model", "my.toml", "--variant", "line"], 1, ["wild.csv: row 2, time 1, cannot be judged", "--gate"]),
+        (
+            ["wild.csv", "--model", "my.toml", "--variant", "line"],
+            1,
+            ["wild.csv: row 2, time 1, cannot be judged", "--gate"],
+        ),
         (
             ["negative.csv", "--model", "my.toml", "--variant", "root"],
             1,
             ["state's noise from step 1 to 2 has a negative variance, -1"],
         ),
-        (["line.csv", "--model", "my.toml", "--variant", "line", "--out", "my.toml"], 1, ["cannot go to my.toml"]),
-        (["line.csv", "--model", "my.toml", "--variant", "line", "--out", "/proc/here"], 1, ["/proc/here"]),
+        (
+            ["line.csv", "--model", "my.toml", "--variant", "line", "--out", "my.toml"],
+            1,
+            ["cannot go to my.toml"],
+        ),
+        (
+            ["line.csv", "--model", "my.toml", "--variant", "line", "--out", "/proc/here"],
+            1,
+            ["/proc/here"],
+        ),
     ],
 )
 def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, arguments, code, words):
@@ -217,14 +299,18 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, argumen
 
 
 def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
-    assert call("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out").exit_code == 0
+    assert (
+        call("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out").exit_code == 0
+    )
     before = {path: path.read_bytes() for path in (place / "out").iterdir()}
 
     def broken(*_):
         raise RuntimeError("no pictures today")
 
     monkeypatch.setattr(own_data, "save_figure", broken)
-    result = call("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out", "--gate", 0.9)
+    result = call(
+        "line.csv", "--model", "my.toml", "--variant", "line", "--out", "out", "--gate", 0.9
+    )
     assert result.exit_code == 1 and "no pictures today" in result.output
     assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before
 
@@ -244,5 +330,7 @@ def test_a_finding_in_words():
 
 def test_names_that_are_none_are_told(place):
     variant = model_of(place / "my.toml", "line")
-    with pytest.raises(ValueError, match=r"structure must be one of linearised, gaussian, .*, got 'extended'"):
+    with pytest.raises(
+        ValueError, match=r"structure must be one of linearised, gaussian, .*, got 'extended'"
+    ):
         estimate_record(place / "line.csv", variant, structure="extended")

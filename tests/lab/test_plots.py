@@ -47,13 +47,16 @@ def ax():
 
 @pytest.mark.parametrize("kind", ["scalar", "vector", "without a bound", "one filter"])
 @pytest.mark.parametrize("draw", DRAW)
-@pytest.mark.filterwarnings("ignore:No artists with labels")  # the control relative to itself is not drawn
+# the control relative to itself is not drawn
+@pytest.mark.filterwarnings("ignore:No artists with labels")
 def test_a_figure_draws_on_the_axes_given_and_labels_them(results, ax, draw, kind):
     assert draw(results[kind], ax) is ax
     assert isinstance(ax, Axes)
     assert ax.get_xlabel()
     if draw is plots.ranking:  # one row a filter
-        assert [label.get_text() for label in ax.get_yticklabels()][::-1] == [title(n) for n, _ in results[kind].ranking()]
+        assert [label.get_text() for label in ax.get_yticklabels()][::-1] == [
+            title(n) for n, _ in results[kind].ranking()
+        ]
     else:
         assert ax.get_xlabel() == "step $k$"
         assert ax.get_ylabel()
@@ -115,16 +118,22 @@ def band(ax, index):
 @pytest.mark.parametrize("confidence", [0.9, 0.95])
 def test_the_bands_are_confidence_intervals(results, confidence):
     result = results["vector"]
-    ax = plots.relative_accuracy(result, Figure().add_subplot(), ["duof", "particle"], confidence=confidence)
+    ax = plots.relative_accuracy(
+        result, Figure().add_subplot(), ["duof", "particle"], confidence=confidence
+    )
     for i, name in enumerate(["duof", "particle"]):
         low, high = result.gap(name).interval(confidence)
         np.testing.assert_allclose(band(ax, i), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
-    ax = plots.relative_accuracy(results["scalar"], Figure().add_subplot(), ["duof", "aof-exact"], confidence=confidence)
+    ax = plots.relative_accuracy(
+        results["scalar"], Figure().add_subplot(), ["duof", "aof-exact"], confidence=confidence
+    )
     low, high = results["scalar"].gap("duof").interval(confidence)
     np.testing.assert_allclose(band(ax, 0), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
     assert len(ax.collections) == 1  # the exact filter is the axis
     ax = plots.consistency(result, Figure().add_subplot(), ["duof"], confidence=confidence)
-    np.testing.assert_allclose(band(ax, 0), result.normalised_error("duof").interval(confidence), rtol=1e-12)
+    np.testing.assert_allclose(
+        band(ax, 0), result.normalised_error("duof").interval(confidence), rtol=1e-12
+    )
 
 
 def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
@@ -132,13 +141,17 @@ def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
     plots.ranking(result, ax)
     for bars, (_, score) in zip(ax.containers, result.ranking()[::-1], strict=True):
         (segment,) = bars.lines[2][0].get_segments()
-        np.testing.assert_allclose(segment[:, 0], [100 * limit for limit in score.interval(0.95)], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            segment[:, 0], [100 * limit for limit in score.interval(0.95)], rtol=1e-9, atol=1e-12
+        )
 
 
 def test_the_lines_are_the_numbers(results, ax):
     result = results["vector"]
     plots.accuracy(result, ax, ["fos-gaussian"])
-    np.testing.assert_array_equal(ax.lines[0].get_ydata(), result.error_variance("fos-gaussian").value)
+    np.testing.assert_array_equal(
+        ax.lines[0].get_ydata(), result.error_variance("fos-gaussian").value
+    )
     assert ax.get_yscale() == "log"
 
 
@@ -156,6 +169,11 @@ def test_a_filter_s_line_is_seen_on_the_page(name, theme):
 
 @pytest.mark.parametrize("names", SIDE_BY_SIDE)
 def test_the_colour_blind_tell_filters_of_a_figure_apart(names):
-    """By their colours alone, at seven times what is just noticed; each has a marker of its own besides."""
-    assert min(apart(look(one)[0], look(other)[0]) for one, other in combinations(names, 2)) > 7 * 2.3
-    assert len({look(name)[1] for name in names if name != "iterated"}) == len({*names} - {"iterated"})
+    """By their colours alone, at seven times what is just noticed; each has a marker of its own
+    besides."""
+    assert (
+        min(apart(look(one)[0], look(other)[0]) for one, other in combinations(names, 2)) > 7 * 2.3
+    )
+    assert len({look(name)[1] for name in names if name != "iterated"}) == len(
+        {*names} - {"iterated"}
+    )

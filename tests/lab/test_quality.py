@@ -1,4 +1,5 @@
-"""Quality of variants: each criterion against a reference of its own, bad variants refused for the intended reason, proposals."""
+"""Quality of variants: each criterion against a reference of its own, bad variants refused for the
+intended reason, proposals."""
 
 import re
 import tomllib
@@ -40,13 +41,23 @@ DESIGNED = ("duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-lin
 
 
 def variant(state, meter, parameters=None, **options):
-    return read_variant("t", {"state": state, "meter": meter, "parameters": parameters or {}} | options, "the test")
+    return read_variant(
+        "t", {"state": state, "meter": meter, "parameters": parameters or {}} | options, "the test"
+    )
 
 
 def compared(model, names, runs, seed, steps=STEPS):
     """A comparison that holds the estimate without measurements too."""
     x = simulate(model, 20_000, steps, seed + 1000).x
-    return compare([*lab_filters(model, names), unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False)
+    return compare(
+        [*lab_filters(model, names), unmeasured(model, x)],
+        model,
+        runs,
+        steps,
+        seed,
+        jobs=1,
+        progress=False,
+    )
 
 
 # --- the shipped variants
@@ -54,7 +65,8 @@ def compared(model, names, runs, seed, steps=STEPS):
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_variant_is_well_posed(name):
-    """In variant 12 the filters differ by a thousandth only, in 53 by a few tails: that takes more trajectories to see."""
+    """In variant 12 the filters differ by a thousandth only, in 53 by a few tails: that takes more
+    trajectories to see."""
     found = examine(SHIPPED[name], 40_000 if name in ("12", "53") else 10_000)
     assert found.well_posed, found.faults
     assert found.linear == (name == "1")
@@ -77,31 +89,59 @@ def test_the_result_does_not_depend_on_the_number_of_processes():
 SAME = "no two filters differ"
 BAD = {
     "exploding": (dict(state="1.2*x + v", meter="x + w"), {"bounded": r"grows 9\.\de\+03 times"}),
-    "slowly exploding": (dict(state="1.06*x + 0.1*v", meter="x + 0.1*x**2 + w"), {"bounded": r"grows \d\d\.\d times"}),
-    "infinite": (dict(state="2*x**3 + v", meter="x + w"), {"bounded": "trajectories become infinite"}),
+    "slowly exploding": (
+        dict(state="1.06*x + 0.1*v", meter="x + 0.1*x**2 + w"),
+        {"bounded": r"grows \d\d\.\d times"},
+    ),
+    "infinite": (
+        dict(state="2*x**3 + v", meter="x + w"),
+        {"bounded": "trajectories become infinite"},
+    ),
     "rarely infinite": (
         dict(state="0.9*x + 0.05*x**3 + 0.1*v", meter="x + 0.3*w", prior={"variance": 0.09}),
         {"bounded": "infinite when deviations are 1.5 times larger"},
     ),
-    "heavy tails": (dict(state="0.9*x + 0.9*x*v", meter="x + 0.3*w"), {"bounded": "too heavy tails"}),
-    "noise only": (dict(state="0.9*x + v", meter="x*w"), {"observable": "hardly tells", "filters differ": SAME}),
-    "far too noisy": (dict(state="0.9*x + 0.2*sin(x) + v", meter="x + 20*w"), {"observable": r"leaves 9\d(\.\d)? % .* of x$"}),
-    "symmetric": (dict(state="0.9*x + 0.3*v", meter="x**2 + 0.3*w"), {"observable": "hardly tells"}),
+    "heavy tails": (
+        dict(state="0.9*x + 0.9*x*v", meter="x + 0.3*w"),
+        {"bounded": "too heavy tails"},
+    ),
+    "noise only": (
+        dict(state="0.9*x + v", meter="x*w"),
+        {"observable": "hardly tells", "filters differ": SAME},
+    ),
+    "far too noisy": (
+        dict(state="0.9*x + 0.2*sin(x) + v", meter="x + 20*w"),
+        {"observable": r"leaves 9\d(\.\d)? % .* of x$"},
+    ),
+    "symmetric": (
+        dict(state="0.9*x + 0.3*v", meter="x**2 + 0.3*w"),
+        {"observable": "hardly tells"},
+    ),
     "a component not seen": (
         dict(state=["0.9*x1 + 0.3*v1", "0.8*x2 + 0.3*v2"], meter=["x1 + 0.3*(1 + x1**2)*w1"]),
         {"observable": "of the variance of x2$", "filters differ": SAME},
     ),
     "a constant component": (
-        dict(state=["0.9*x1 + x2*v1", "x2"], meter=["x1 + x2 + 0.3*w1"], prior={"mean": [1, 1], "variance": [1, 0]}),
+        dict(
+            state=["0.9*x1 + x2*v1", "x2"],
+            meter=["x1 + x2 + 0.3*w1"],
+            prior={"mean": [1, 1], "variance": [1, 0]},
+        ),
         {"observable": "x2 does not vary", "filters differ": SAME},
     ),
     "a perfect meter": (dict(state="sin(x) + 0.3*v", meter="x"), {"filters differ": SAME}),
-    "almost linear": (dict(state="0.9*x + 0.3*v", meter="x + 0.001*x**2 + 0.5*w"), {"filters differ": SAME}),
+    "almost linear": (
+        dict(state="0.9*x + 0.3*v", meter="x + 0.001*x**2 + 0.5*w"),
+        {"filters differ": SAME},
+    ),
     "no closed form": (
         dict(state="0.9*x + 0.3*v", meter="log(1 + x**2) + x + 0.3*w"),
         {"solvable": r"term log\(x\*\*2 \+ 1\)"},
     ),
-    "not differentiable": (dict(state="0.9*x + 0.3*v", meter="abs(x) + x + 0.3*w"), {"solvable": r"term Abs\(x\)"}),
+    "not differentiable": (
+        dict(state="0.9*x + 0.3*v", meter="abs(x) + x + 0.3*w"),
+        {"solvable": r"term Abs\(x\)"},
+    ),
 }
 
 
@@ -121,7 +161,10 @@ def test_a_bad_variant_is_refused_for_its_reason(case):
 def test_long_formulas_are_refused(monkeypatch):
     monkeypatch.setattr("kfcourse.lab.quality.LONGEST", 20)
     found = examine(SHIPPED["53"], FEWEST)
-    assert found.faults["solvable"] == "closed form, 28 operations in the Gaussian structural functions, more than 20"
+    assert (
+        found.faults["solvable"]
+        == "closed form, 28 operations in the Gaussian structural functions, more than 20"
+    )
 
 
 def test_a_derivation_without_end_is_given_up(monkeypatch):
@@ -144,12 +187,16 @@ def test_a_variant_whose_questions_cannot_be_posed_is_named_with_the_question():
 
 
 def test_growth_is_that_of_the_second_moment():
-    x = 1.1 ** np.arange(51)[:, None, None] * np.random.default_rng(1).choice([-1.0, 1.0], (51, 400, 1))
-    assert bounded(x).value == pytest.approx(1.1 ** (2 * 25), rel=1e-12)  # maxima at the steps 50 and 25
+    x = 1.1 ** np.arange(51)[:, None, None] * np.random.default_rng(1).choice(
+        [-1.0, 1.0], (51, 400, 1)
+    )
+    # maxima at the steps 50 and 25
+    assert bounded(x).value == pytest.approx(1.1 ** (2 * 25), rel=1e-12)
     assert not bounded(x).ok
     assert bounded(x[::-1]).ok
     assert bounded(x[:1]).ok  # one step does not grow
-    assert bounded(np.concatenate([x[::-1], x], axis=2)).value == pytest.approx(1.1**50, rel=1e-12)  # the worst component
+    # the worst component
+    assert bounded(np.concatenate([x[::-1], x], axis=2)).value == pytest.approx(1.1**50, rel=1e-12)
 
 
 def test_a_moment_of_a_few_trajectories_is_refused():
@@ -176,7 +223,8 @@ def test_infinite_trajectories_are_found_with_their_step(bad):
 
 
 def riccati(steps):
-    """Error variance of the Kalman filter of variant 1 over the state's variance, mean over the steps."""
+    """Error variance of the Kalman filter of variant 1 over the state's variance, mean over the
+    steps."""
     c, e, g, f = 0.9, 0.3, 1.0, 0.5
     free = prior = 1.0
     ratios = []
@@ -194,7 +242,8 @@ def test_the_share_of_a_kalman_filter_is_that_of_the_riccati_equation():
 
 
 def test_a_share_that_is_not_known_well_is_not_enough():
-    """Behind this meter 0.84 is left: below UNSEEN = 0.9, but by less than four standard errors of 256 trajectories."""
+    """Behind this meter 0.84 is left: below UNSEEN = 0.9, but by less than four standard errors of
+    256 trajectories."""
     one = variant("0.9*x + 0.3*v", "x + f*w", {"f": 3.5})
     few, many = (examine(one, runs).findings["observable"] for runs in (256, 20_000))
     assert few.value < 0.9
@@ -226,24 +275,30 @@ def test_the_filters_of_a_linear_variant_do_not_differ_even_if_their_design_is_n
 
 
 def test_the_largest_difference_is_found_where_theory_has_it():
-    """Variant 2 at step 0, x ~ N(0, 1), y = x + h x^2 + f w: linearised and Gaussian gains by hand."""
+    """Variant 2 at step 0, x ~ N(0, 1), y = x + h x^2 + f w: linearised and Gaussian gains by
+    hand."""
     h, f = 0.3, 0.3
 
     def error_variance(gain, mean):  # M(x - K(x + h x^2 + f w - mean))^2 with M x^2 = 1, M x^4 = 3
         return (1 - gain) ** 2 + gain**2 * (3 * h**2 - 2 * h * mean + mean**2 + f**2)
 
-    linearised, exact = error_variance(1 / (1 + f**2), 0.0), error_variance(1 / (1 + 2 * h**2 + f**2), h)
+    linearised, exact = (
+        error_variance(1 / (1 + f**2), 0.0),
+        error_variance(1 / (1 + 2 * h**2 + f**2), h),
+    )
     result = compared(SHIPPED["2"].model, ["aof-gaussian", "aof-linearised"], 20_000, 1)
     found = differences(result, ())
     assert found.ok
     assert found.says.startswith("GAOF and LAOF differ by ")
     assert found.says.endswith("at step 0")
     error = result.difference("aof-gaussian", "aof-linearised").standard_error[0] / exact
-    assert abs(found.value - (linearised / exact - 1)) < 5 * error  # 5: the denominator varies too, less
+    # 5: the denominator varies too, less
+    assert abs(found.value - (linearised / exact - 1)) < 5 * error
 
 
 def test_false_alarms_are_as_rare_as_promised():
-    """Two equal meters, each filter reads one: of 60 ensembles 1 % may alarm, four with a probability of 0.003."""
+    """Two equal meters, each filter reads one: of 60 ensembles 1 % may alarm, four with a
+    probability of 0.003."""
     model = Model.define(["0.5*x1 + v1"], ["x1 + w1", "x1 + w2"], symbols={"x": ["x1"]})
 
     def reading(place):
@@ -254,14 +309,22 @@ def test_false_alarms_are_as_rare_as_promised():
         return Filter(f"meter {place}", model, initial_state(model), step)
 
     filters = [reading(0), reading(1)]
-    alarms = sum(differences(compare(filters, model, 512, 16, seed, jobs=1, progress=False), ()).ok for seed in range(60))
+    alarms = sum(
+        differences(compare(filters, model, 512, 16, seed, jobs=1, progress=False), ()).ok
+        for seed in range(60)
+    )
     assert alarms <= 3
 
 
 def test_linear_is_linear_in_state_and_noise():
     assert is_linear(LINEAR)
     assert is_linear(Model.define(["x1 + 0.1*x2 + v1", "x2"], ["(x1 + 1)**2 - x1**2 + w1"]))
-    for state, meter in (("x*v", "x + w"), ("x + v", "x + x*w"), ("x + v", "sin(x) + w"), ("x + v**2", "x + w")):
+    for state, meter in (
+        ("x*v", "x + w"),
+        ("x + v", "x + x*w"),
+        ("x + v", "sin(x) + w"),
+        ("x + v**2", "x + w"),
+    ):
         assert not is_linear(Model.define(state, meter))
     assert is_linear(Model.define("x + c*x**2 + v", "x + w", {"c": 0}))
 
@@ -281,9 +344,21 @@ def test_the_table_tells_everything():
     good = Quality("a", GOOD)
     bad = Quality("bad", GOOD | {"observable": Finding(False, "blind", 0.97)} | same)
     linear = Quality("lin", GOOD | same, True, ("linear",))
-    lost = Quality("lost", {"bounded": Finding(False, "explodes", 1e9), "solvable": GOOD["solvable"]}, remarks=("one", "two"))
+    lost = Quality(
+        "lost",
+        {"bounded": Finding(False, "explodes", 1e9), "solvable": GOOD["solvable"]},
+        remarks=("one", "two"),
+    )
     lines = table([good, bad, linear, lost]).splitlines()
-    assert lines[0].split() == ["variant", "bounded", "observable", "filters", "differ", "solvable", "remarks"]
+    assert lines[0].split() == [
+        "variant",
+        "bounded",
+        "observable",
+        "filters",
+        "differ",
+        "solvable",
+        "remarks",
+    ]
     assert [line.split() for line in lines[1:5]] == [
         ["a", "yes", "yes", "12.3", "%", "yes", "5", "%", "yes"],
         ["bad", "yes", "NO", "97", "%", "NO", "yes"],
@@ -310,7 +385,10 @@ def test_every_candidate_is_a_model_with_numbers_to_type():
         assert (
             set(proposed["parameters"])
             == {s.name for s in model.values}
-            <= {s.name for s in model.state_equation.free_symbols | model.meter_equation.free_symbols}
+            <= {
+                s.name
+                for s in model.state_equation.free_symbols | model.meter_equation.free_symbols
+            }
         )
         shapes.add(str([proposed["state"], proposed["meter"]]))
     assert len(shapes) > 80
@@ -356,15 +434,22 @@ def test_the_same_seed_generates_the_same_text_whatever_the_processes(generated)
 
 @pytest.fixture
 def judged(monkeypatch):
-    """Candidates x' = c x + i v with c = 0, 1, ..., i = c // 2, of the findings chosen, without any simulation."""
+    """Candidates x' = c x + i v with c = 0, 1, ..., i = c // 2, of the findings chosen, without any
+    simulation."""
 
     def use(*findings):
         def judge(candidate, *_):
             c = int(candidate["parameters"]["c"])
-            return Quality("", GOOD | (findings[c] if c < len(findings) else {}), linear=c == len(findings))
+            return Quality(
+                "", GOOD | (findings[c] if c < len(findings) else {}), linear=c == len(findings)
+            )
 
         def proposed(seed, index):
-            return {"state": f"c*x + {index // 2}*v", "meter": "x + w", "parameters": {"c": float(index)}}
+            return {
+                "state": f"c*x + {index // 2}*v",
+                "meter": "x + w",
+                "parameters": {"c": float(index)},
+            }
 
         monkeypatch.setattr(grammar, "_judge", judge)
         monkeypatch.setattr(grammar, "propose", proposed)
@@ -375,17 +460,25 @@ def judged(monkeypatch):
 def test_candidates_are_rejected_for_each_reason(judged):
     judged(*({name: Finding(False, "")} for name in GOOD))
     found = generate(3, jobs=1)
-    assert found.rejected == Counter({name: 1 for name in GOOD} | {"linear": 1, "formulas of another one": 1})
+    assert found.rejected == Counter(
+        {name: 1 for name in GOOD} | {"linear": 1, "formulas of another one": 1}
+    )
     assert [float(one.model.parameters["c"]) for one in found.variants] == [5, 6, 8]
     assert [one.name for one in found.variants] == ["g1", "g2", "g3"]
 
 
 def test_a_search_without_end_is_given_up_and_formulas_are_seldom_repeated(judged, monkeypatch):
     judged()
-    monkeypatch.setattr(grammar, "propose", lambda *_: {"state": "0.9*x + v", "meter": "x + w", "parameters": {"c": 9}})
+    monkeypatch.setattr(
+        grammar,
+        "propose",
+        lambda *_: {"state": "0.9*x + v", "meter": "x + w", "parameters": {"c": 9}},
+    )
     monkeypatch.setattr(grammar, "read_variant", lambda name, *_: name)
     found = generate(4, jobs=1)
-    assert found.variants == ["g1"] and found.rejected == {"formulas of another one": 4 * grammar.PATIENCE - 1}
+    assert found.variants == ["g1"] and found.rejected == {
+        "formulas of another one": 4 * grammar.PATIENCE - 1
+    }
     assert len(generate(150, jobs=1).variants) == 4
 
 
@@ -412,7 +505,9 @@ def test_check_says_well_posed_by_status_0(call):
 
 
 def test_check_says_what_is_wrong_by_status_1(call, tmp_path):
-    (tmp_path / "mine.toml").write_text('[variants.boom]\nstate = "1.2*x + v"\nmeter = "x**2 + x + w"\n', encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(
+        '[variants.boom]\nstate = "1.2*x + v"\nmeter = "x**2 + x + w"\n', encoding="utf-8"
+    )
     result = call("--check", "--variants", "mine.toml", "--runs", 256, "--jobs", 1)
     assert result.exit_code == 1
     assert "variant boom is not well posed, bounded: the second moment grows" in result.stdout
@@ -430,7 +525,9 @@ def quick(monkeypatch):
     """`generate` without computing: it finds two variants at most."""
 
     def made(wanted, seed, runs, jobs, ask):
-        found = [read_variant(f"g{i + 1}", propose(seed, i), "the test") for i in range(min(wanted, 2))]
+        found = [
+            read_variant(f"g{i + 1}", propose(seed, i), "the test") for i in range(min(wanted, 2))
+        ]
         return grammar.Generated(found, Counter({"bounded": 3, "linear": 1}))
 
     monkeypatch.setattr(grammar, "generate", made)
@@ -440,7 +537,9 @@ def test_proposals_are_printed_and_rejections_are_not_among_them(call, quick):
     result = call("--generate", 2, "--seed", 9)
     assert result.exit_code == 0
     assert list(tomllib.loads(result.stdout)["variants"]) == ["g1", "g2"]
-    assert result.stdout.startswith("# Made by: kfcourse variants --generate 2 --seed 9 --runs 40000\n")
+    assert result.stdout.startswith(
+        "# Made by: kfcourse variants --generate 2 --seed 9 --runs 40000\n"
+    )
     assert result.stderr == "4 candidates rejected: 3 bounded, 1 linear\n"
 
 
@@ -457,7 +556,9 @@ def test_too_few_proposals_are_written_and_said(call, quick, tmp_path):
     assert len(load_variants(tmp_path / "new.toml")) == 2
 
 
-@pytest.mark.parametrize("out", ["old.toml", ".", "no/such/folder/new.toml", "old.toml/new.toml", "dangling"])
+@pytest.mark.parametrize(
+    "out", ["old.toml", ".", "no/such/folder/new.toml", "old.toml/new.toml", "dangling"]
+)
 def test_a_bad_out_is_refused_before_the_computation(call, tmp_path, monkeypatch, out):
     monkeypatch.setattr(grammar, "generate", lambda *_: pytest.fail("the computation began"))
     (tmp_path / "old.toml").write_text("precious", encoding="utf-8")
@@ -511,7 +612,9 @@ def test_an_unknown_variant_or_file_is_named(call):
 
 
 def test_a_bad_variant_in_the_file_is_named_before_any_check(call, tmp_path):
-    (tmp_path / "mine.toml").write_text('[variants.a]\nstate = "x + v"\nmeter = "3 + w"\n', encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(
+        '[variants.a]\nstate = "x + v"\nmeter = "3 + w"\n', encoding="utf-8"
+    )
     with pytest.raises(VariantError):
         load_variants(tmp_path / "mine.toml")
     result = call("--check", "--variants", "mine.toml")

@@ -1,4 +1,5 @@
-"""The student's report of a model with modes, in both languages; its equations are those that run."""
+"""The student's report of a model with modes, in both languages; its equations are those that
+run."""
 
 import re
 
@@ -37,18 +38,26 @@ def carry_out(equations, values):
             for at, one in enumerate(arguments)
         ]
         formula = equation.rhs.xreplace(dict(zip(arguments, dummies, strict=True)))
-        values[equation.lhs] = sp.lambdify(dummies, formula, "numpy")(*(values[one] for one in arguments))
+        values[equation.lhs] = sp.lambdify(dummies, formula, "numpy")(
+            *(values[one] for one in arguments)
+        )
 
 
 def test_the_printed_equations_are_the_logic_dynamic_filter():
-    """Executed one after the other for two modes and three steps, with structural functions, densities and pi put in."""
+    """Executed one after the other for two modes and three steps, with structural functions,
+    densities and pi put in."""
     structures, y = [gaussian(mode) for mode in MODEL.modes], simulate(MODEL, 1, 3, seed=5).y
     one = logic_dynamic(structures, MODEL, MODEL.first)
     state, values = one.init(1), {}
     for j in (1, 2):
-        values[vector(r"\lambda", j)], values[square(r"\Psi", j)] = MODEL.prior.mean[:, None], MODEL.prior.cov
+        values[vector(r"\lambda", j)], values[square(r"\Psi", j)] = (
+            MODEL.prior.mean[:, None],
+            MODEL.prior.cov,
+        )
         values[number("c", j)] = MODEL.first[j - 1]
-        values |= {sp.Symbol(rf"\pi^{{{i}{j}}}"): MODEL.transition_at(0)[i - 1, j - 1] for i in (1, 2)}
+        values |= {
+            sp.Symbol(rf"\pi^{{{i}{j}}}"): MODEL.transition_at(0)[i - 1, j - 1] for i in (1, 2)
+        }
     for k in range(3):
         values[s.y] = y[k, 0][:, None]
         for j, structure in enumerate(structures, 1):
@@ -61,7 +70,9 @@ def test_the_printed_equations_are_the_logic_dynamic_filter():
             values[jump_equations.likelihood(j)] = float(np.exp(log_density(as_ensemble, y[k])[0]))
         for j in (1, 2):
             carry_out(jump_equations.correction(j, 2), values)
-        carry_out([*jump_equations.combination(1, 2)[:2], *jump_equations.combination(2, 2)[1:]], values)
+        carry_out(
+            [*jump_equations.combination(1, 2)[:2], *jump_equations.combination(2, 2)[1:]], values
+        )
         state = one.step(state, y[k])
         np.testing.assert_allclose(values[s.z][:, 0], state.posterior.mean[0], rtol=1e-10)
         np.testing.assert_allclose(values[s.P], state.posterior.cov[0], rtol=1e-9, atol=1e-12)
@@ -79,12 +90,26 @@ def test_the_printed_equations_are_the_logic_dynamic_filter():
 @pytest.fixture(scope="module", params=LANGUAGES)
 def written(request, tmp_path_factory):
     """Language, texts, and names of all files."""
-    names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "fkp4-jump-gaussian", "aof-averaged", "aof-exact"]
+    names = [
+        "aof-jump-gaussian",
+        "imm",
+        "gpb2",
+        "fos-jump-gaussian",
+        "fkp4-jump-gaussian",
+        "aof-averaged",
+        "aof-exact",
+    ]
     model = find_variant("J1-lasting").model
     filters = [one.built for one in admissions(model, names)]
     result = compare(filters, model, 128, 3, 1, progress=False, jobs=1)
     folder = tmp_path_factory.mktemp(request.param)
-    paths = write_report(find_variant("J1-lasting"), result, folder, request.param, modes=recognised_modes(result, filters))
+    paths = write_report(
+        find_variant("J1-lasting"),
+        result,
+        folder,
+        request.param,
+        modes=recognised_modes(result, filters),
+    )
     texts = [(folder / name).read_text(encoding="utf-8") for name in ("report.tex", "report.html")]
     return request.param, *texts, {path.name for path in paths}
 
@@ -93,13 +118,33 @@ def test_it_tells_the_modes_their_chain_and_the_filters_of_the_variant(written):
     language, tex, page, names = written
     assert {"modes.svg", "modes.pdf", "accuracy.svg"} <= names
     assert "$2$ & faulty & $10$" in tex and "<td>sound</td>" in page
-    assert r"\pi &= " in tex and "repair" in tex and r"q &= \begin{pmatrix}0.8 & 0.2\end{pmatrix}" in tex
-    for block in (jump_equations.correction("j", 2), jump_equations.combination("j", 2), jump_equations.prediction("j", 2)):
+    assert (
+        r"\pi &= " in tex
+        and "repair" in tex
+        and r"q &= \begin{pmatrix}0.8 & 0.2\end{pmatrix}" in tex
+    )
+    for block in (
+        jump_equations.correction("j", 2),
+        jump_equations.combination("j", 2),
+        jump_equations.prediction("j", 2),
+    ):
         for line in latex(block).split("\n")[1:-1]:
             assert line.removesuffix(r" \\").strip() in tex
     expected = {
-        "en": ["The modes", "The logic-dynamic AOF", "LD-GAOF", "naming the likeliest mode without measuring", "exact AOF"],
-        "ru": ["Режимы", "Логико-динамический АОФ", "ГАОФлд", "наиболее вероятный режим без измерений", "точный АОФ"],
+        "en": [
+            "The modes",
+            "The logic-dynamic AOF",
+            "LD-GAOF",
+            "naming the likeliest mode without measuring",
+            "exact AOF",
+        ],
+        "ru": [
+            "Режимы",
+            "Логико-динамический АОФ",
+            "ГАОФлд",
+            "наиболее вероятный режим без измерений",
+            "точный АОФ",
+        ],
     }[language]
     assert all(text in one for text in expected for one in (tex, page))
     assert not re.search(r"\{(name|names|values|modes|filters|memory)[:}]", tex)
@@ -110,11 +155,18 @@ def test_it_tells_the_modes_their_chain_and_the_filters_of_the_variant(written):
 
 def test_modes_with_other_equations_are_told_one_by_one(tmp_path):
     model = JumpModel.define(
-        "0.9*x + v", "x + w", modes={"calm": {}, "curved": {"meter": "x + 0.1*x**2 + w"}}, transition=[0.8, 0.2]
+        "0.9*x + v",
+        "x + w",
+        modes={"calm": {}, "curved": {"meter": "x + 0.1*x**2 + w"}},
+        transition=[0.8, 0.2],
     )
-    both = [logic_dynamic([kind(mode) for mode in model.modes], model, model.first) for kind in (gaussian, linearised)]
+    both = [
+        logic_dynamic([kind(mode) for mode in model.modes], model, model.first)
+        for kind in (gaussian, linearised)
+    ]
     result = compare(both, model, 400, 3, 1, progress=False, jobs=1)
     write_report(Variant("own", "", model), result, tmp_path, "en")
     tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
-    assert tex.count("In mode $j=2$ (curved):") == 3  # the task, and two kinds of structural functions
+    # the task, and two kinds of structural functions
+    assert tex.count("In mode $j=2$ (curved):") == 3
     assert "In every mode" not in tex

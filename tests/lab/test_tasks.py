@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import JumpModel, Model, cli, compare, gaussian, lab_filters, linearised, load_variants, simulate
+from kfcourse import (
+    JumpModel,
+    Model,
+    cli,
+    compare,
+    gaussian,
+    lab_filters,
+    linearised,
+    load_variants,
+    simulate,
+)
 from kfcourse.filters import aof, logic_dynamic
 from kfcourse.lab.short_names import JumpStructures
 from kfcourse.lab.variants import VariantError, find_variant, read_variant, read_variants
@@ -26,7 +36,12 @@ def law(model, seed, spread=0.1):
 def test_each_is_a_variant_of_its_own_and_none_is_for_the_exercises():
     assert set(TASKS) <= set(read_variants()[0])
     assert not set(TASKS) & set(load_variants())
-    assert [name for name, one in TASKS.items() if isinstance(one.model, JumpModel)] == ["J1", "J2", "J3", "J4"]
+    assert [name for name, one in TASKS.items() if isinstance(one.model, JumpModel)] == [
+        "J1",
+        "J2",
+        "J3",
+        "J4",
+    ]
     assert (TASKS["D1"].steps, TASKS["D2"].steps, TASKS["D3"].steps) == (21, 51, 101)
 
 
@@ -50,7 +65,9 @@ def test_d1_has_the_structural_functions_of_the_note():
             slope,
             slope**2 * d + 1 + more * 2 * 0.2**2 * d * d,
         )
-        np.testing.assert_allclose([np.squeeze(value) for value in (tau, theta, h, G, F)], expected, rtol=1e-12)
+        np.testing.assert_allclose(
+            [np.squeeze(value) for value in (tau, theta, h, G, F)], expected, rtol=1e-12
+        )
 
 
 def test_d2_has_the_structural_functions_of_the_note():
@@ -61,12 +78,15 @@ def test_d2_has_the_structural_functions_of_the_note():
     square = m[0] ** 2 * m[1] + 2 * m[0] * d[0, 1] + m[1] * d[0, 0]  # M[x1^2 x2]
     drift = -((0.1 * np.pi) ** 2) * m[0] + m[1] - 0.25 * square
     np.testing.assert_allclose(tau, [m[0] + T * m[1], m[1] + T * drift], rtol=1e-9)
-    # Cov of the noiseless part by quadrature, exact for its degree, and the noise of variance T (m1^2 + d11)
+    # Cov of the noiseless part by quadrature, exact for its degree, and the noise of variance T
+    # (m1^2 + d11)
     points, weights = np.polynomial.hermite_e.hermegauss(8)
     s = np.stack(np.meshgrid(points, points), axis=-1).reshape(-1, 2)
     w = np.outer(weights, weights).ravel() / (2 * np.pi)
     x1, x2 = (m + s @ np.linalg.cholesky(d).T).T
-    moved = np.stack([x1 + T * x2, x2 + T * (-((0.1 * np.pi) ** 2) * x1 + x2 * (1 - 0.25 * x1 * x1))], axis=1)
+    moved = np.stack(
+        [x1 + T * x2, x2 + T * (-((0.1 * np.pi) ** 2) * x1 + x2 * (1 - 0.25 * x1 * x1))], axis=1
+    )
     away = moved - w @ moved
     noise = np.diag([0, T * (m[0] ** 2 + d[0, 0])])
     np.testing.assert_allclose(theta, (w[:, None] * away).T @ away + noise, rtol=1e-9, atol=1e-12)
@@ -81,31 +101,45 @@ def test_d2_has_the_structural_functions_of_the_note():
 @pytest.mark.parametrize(("k", "sign"), [(20, -1), (45, 0), (46, 1)])
 @pytest.mark.parametrize("name", ["D3", "J3", "J4"])
 def test_the_meter_of_the_landing_has_the_jacobian_of_the_note(name, k, sign):
-    """Columns 2 E rho / x1, E (-rho_2, rho_1), -beta E rho; in J4 those of density, lift and vertical, all times gamma."""
+    """Columns 2 E rho / x1, E (-rho_2, rho_1), -beta E rho; in J4 those of density, lift and
+    vertical, all times gamma."""
     model = TASKS[name].model
     modes = (
-        [(model, 1.0)] if isinstance(model, Model) else list(zip(model.modes, (1.0, {"J3": 0.01, "J4": 0.1}[name]), strict=True))
+        [(model, 1.0)]
+        if isinstance(model, Model)
+        else list(zip(model.modes, (1.0, {"J3": 0.01, "J4": 0.1}[name]), strict=True))
     )
     for mode, gamma in modes:
         m, d = law(mode, 3)
         h, G, _, R = linearised(mode).at(k).measure(m, d)
         speed, angle, height = m[:3]
-        density, lift, theta = (m[3], m[4], angle - m[5]) if name == "J4" else (0.0433333, 0.3, angle)
+        density, lift, theta = (
+            (m[3], m[4], angle - m[5]) if name == "J4" else (0.0433333, 0.3, angle)
+        )
         E, kappa = density * speed**2 * np.exp(-0.09 * height), lift * sign
-        rho = np.array([np.cos(theta) - kappa * np.sin(theta), np.sin(theta) + kappa * np.cos(theta)])
+        rho = np.array(
+            [np.cos(theta) - kappa * np.sin(theta), np.sin(theta) + kappa * np.cos(theta)]
+        )
         turned = np.array([-rho[1], rho[0]])
         columns = [2 * E * rho / speed, E * turned, -0.09 * E * rho]
         if name == "J4":
-            columns += [E * rho / density, E * sign * np.array([-np.sin(theta), np.cos(theta)]), -E * turned]
+            columns += [
+                E * rho / density,
+                E * sign * np.array([-np.sin(theta), np.cos(theta)]),
+                -E * turned,
+            ]
         np.testing.assert_allclose(h, gamma * E * rho, rtol=1e-9)
         np.testing.assert_allclose(G, gamma * np.column_stack(columns), rtol=1e-9, atol=1e-18)
         additive = 4e-14 if name == "D3" else 4e-10
-        np.testing.assert_allclose(R, gamma**2 * np.diag(E**2 * rho**2 * 1e-4 + additive), rtol=1e-9, atol=1e-30)
+        np.testing.assert_allclose(
+            R, gamma**2 * np.diag(E**2 * rho**2 * 1e-4 + additive), rtol=1e-9, atol=1e-30
+        )
 
 
 @pytest.mark.parametrize("name", ["D3", "J3", "J4"])
 def test_the_lift_is_switched_at_45_s(name):
-    """The path angle's step without what gravity and the planet's curvature make of it: c kappa(t) x1 exp(-beta x3)."""
+    """The path angle's step without what gravity and the planet's curvature make of it: c kappa(t)
+    x1 exp(-beta x3)."""
     model = TASKS[name].model
     x = simulate(model, 50, 60, seed=2).x
     one = model if isinstance(model, Model) else model.modes[0]
@@ -128,8 +162,11 @@ def test_j4_knows_neither_density_nor_lift_nor_vertical():
 
 
 def test_filters_of_the_tasks_gain_from_their_measurements():
-    """Each of the lab's on D2 is better than the state's own spread; with modes on J4, better than who only averages them."""
-    result = compare(lab_filters(TASKS["D2"].model), TASKS["D2"].model, 1000, 30, 1, progress=False, jobs=1)
+    """Each of the lab's on D2 is better than the state's own spread; with modes on J4, better than
+    who only averages them."""
+    result = compare(
+        lab_filters(TASKS["D2"].model), TASKS["D2"].model, 1000, 30, 1, progress=False, jobs=1
+    )
     spread = simulate(TASKS["D2"].model, 1000, 30, seed=2).x[-1].var(axis=0).sum()
     assert all(result.error_variance(name).value[-1] < 0.1 * spread for name in result.names)
     found = JumpStructures(TASKS["J4"].model)
@@ -141,12 +178,16 @@ def test_filters_of_the_tasks_gain_from_their_measurements():
 
 @pytest.mark.parametrize("steps", [0, -3, 2.5, True, "many"])
 def test_a_variant_says_how_many_steps_in_a_whole_number(steps):
-    with pytest.raises(VariantError, match=r"variant a in here: .*steps.* must be a positive whole number.*, got"):
+    with pytest.raises(
+        VariantError, match=r"variant a in here: .*steps.* must be a positive whole number.*, got"
+    ):
         read_variant("a", {"state": "x + v", "meter": "x + w", "steps": steps}, "here")
 
 
 def test_the_lab_takes_the_steps_of_the_variant(tmp_path):
     few = ("--runs", "300", "--filters", "duof")
-    result = CliRunner().invoke(cli.main, ["lab", "D1", *few, "--out", str(tmp_path / "r"), "--json", str(tmp_path / "n")])
+    result = CliRunner().invoke(
+        cli.main, ["lab", "D1", *few, "--out", str(tmp_path / "r"), "--json", str(tmp_path / "n")]
+    )
     assert result.exit_code == 0, result.output
     assert '"steps": 21,' in (tmp_path / "n").read_text()

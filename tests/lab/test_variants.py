@@ -1,4 +1,5 @@
-"""The lab's variants and filters by name; hostile ones are refused.  That the shipped ones are well posed: test_quality."""
+"""The lab's variants and filters by name; hostile ones are refused.  That the shipped ones are well
+posed: test_quality."""
 
 import tomllib
 
@@ -11,7 +12,13 @@ from kfcourse.checks.posing import unposed
 from kfcourse.filters import Design, Filter
 from kfcourse.lab import variants as of_variants
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
-from kfcourse.lab.variants import VariantError, VariantWarning, chosen_variants, find_variant, read_variants
+from kfcourse.lab.variants import (
+    VariantError,
+    VariantWarning,
+    chosen_variants,
+    find_variant,
+    read_variants,
+)
 
 pytestmark = pytest.mark.quick
 
@@ -83,7 +90,9 @@ def test_a_name_asked_for_twice_is_built_once():
 
 
 def test_an_unknown_filter_is_named_with_the_known_ones():
-    with pytest.raises(ValueError, match=r"unknown filter 'ekf', 'x'; known: aof-gaussian, .*particle"):
+    with pytest.raises(
+        ValueError, match=r"unknown filter 'ekf', 'x'; known: aof-gaussian, .*particle"
+    ):
         lab_filters(SHIPPED["53"].model, ["duof", "ekf", "x"])
 
 
@@ -96,7 +105,10 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
     with pytest.raises(ModelError, match=r"^aof-exact: .*noise enters nonlinearly"):
         lab_filters(Model.define("0.9*x + v", "x + w**2"), ["aof-exact"])
     assert lab_filters(SHIPPED["20"].model, ["aof-exact"])[0].name == "aof-exact"
-    assert len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"])) == 4
+    assert (
+        len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"]))
+        == 4
+    )
 
 
 # --- files of variants
@@ -106,7 +118,8 @@ def test_the_issue_s_example_is_read(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(
         '[variants.53]\nstate = "c*x + e*x*v"\nmeter = "g*x + f*x**2*w"\n'
-        "parameters = { c = 0.9, e = 0.05, g = 1.0, f = 0.02 }\nprior = { mean = 0.0, variance = 1.0 }\n",
+        "parameters = { c = 0.9, e = 0.05, g = 1.0, f = 0.02 }\nprior = { mean = 0.0, variance = "
+        "1.0 }\n",
         encoding="utf-8",
     )
     mine = load_variants(str(path))
@@ -118,9 +131,12 @@ def test_the_issue_s_example_is_read(tmp_path):
 def test_all_keys_of_a_vector_variant_are_read(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(
-        '[variants.v]\ntitle = "two"\nstate = ["a + k*b", "b + q"]\nmeter = ["a + r"]\nparameters = { k = 0.1 }\n'
-        'symbols = { x = ["a", "b"], v = ["q"], w = ["r"] }\nprior = { mean = [1, 2], variance = [[2, 1], [1, 3]] }\n'
-        "state_noise = { variance = 0.25 }\nmeter_noise = { mean = 0.5, variance = 4 }\nangles = ['y']\n",
+        '[variants.v]\ntitle = "two"\nstate = ["a + k*b", "b + q"]\nmeter = ["a + r"]\nparameters '
+        "= { k = 0.1 }\n"
+        'symbols = { x = ["a", "b"], v = ["q"], w = ["r"] }\nprior = { mean = [1, 2], variance = '
+        "[[2, 1], [1, 3]] }\n"
+        "state_noise = { variance = 0.25 }\nmeter_noise = { mean = 0.5, variance = 4 }\nangles = "
+        "['y']\n",
         encoding="utf-8",
     )
     model = find_variant("v", path).model
@@ -147,7 +163,10 @@ BAD_VARIANTS = {
     "meter without state": ('state = "x + v"\nmeter = "3 + w"', "does not depend on the state"),
     "attribute": ('state = "x.__class__"\nmeter = "x + w"', "not allowed"),
     "a power tower": ('state = "x*9**9**9**9 + v"\nmeter = "x + w"', "exponent"),
-    "a long formula": ('state = "' + "(" * 5000 + "x" + ")" * 5000 + '"\nmeter = "x + w"', "characters"),
+    "a long formula": (
+        'state = "' + "(" * 5000 + "x" + ")" * 5000 + '"\nmeter = "x + w"',
+        "characters",
+    ),
     "parameter nan": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = nan }', "c = nan"),
     "parameter text": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = "0.9" }', "'0.9'"),
     "parameter named as the state": (GOOD + "parameters = { x = 1 }", "named twice"),
@@ -160,17 +179,27 @@ BAD_VARIANTS = {
     "an exponential beyond the floats": ('state = "x + exp(400)*v"\nmeter = "x + w"', "5.22e+173"),
     "the end in a comment": ('state = "0.9*x # + v"\nmeter = "x + w"', "number sign"),
     "no noise": ('state = "0.9*x"\nmeter = "x"', "no noise enters the state equation"),
-    "a state known exactly": (GOOD + "prior = { variance = 0 }\nstate_noise = { variance = 0 }", "known exactly"),
+    "a state known exactly": (
+        GOOD + "prior = { variance = 0 }\nstate_noise = { variance = 0 }",
+        "known exactly",
+    ),
     "mean of the wrong shape": (GOOD + "prior = { mean = [1, 2] }", "`prior`"),
     "covariance not symmetric": (
-        'state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nprior = { variance = [[1.0, 0.5], [0.0, 1.0]] }',
+        'state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nprior = { variance = [[1.0, 0.5], [0.0, '
+        "1.0]] }",
         "symmetric",
     ),
     "law of other keys": (GOOD + "prior = { sigma = 1 }", "sigma"),
     "a number in quotes": (GOOD + 'prior = { mean = "1e5" }', "got mean = '1e5'"),
-    "inputs in quotes": (GOOD.replace("x + w", "x + u + w") + 'inputs = { u = ["1", "2"] }', "the input u must be a list"),
+    "inputs in quotes": (
+        GOOD.replace("x + w", "x + u + w") + 'inputs = { u = ["1", "2"] }',
+        "the input u must be a list",
+    ),
     "angles 3": (GOOD + "angles = 3", "`angles` must name components"),
-    "ten thousand hexadecimal digits": (GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}", "numbers of thousands of digits"),
+    "ten thousand hexadecimal digits": (
+        GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}",
+        "numbers of thousands of digits",
+    ),
     "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
     "symbols not named": (GOOD + "symbols = { x = 5 }", "x must be a name or a list of names"),
 }
@@ -186,7 +215,8 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
     message = str(caught.value)
     assert message.startswith(f"variant bad in {path}: ")
     assert problem in message
-    assert find_variant("good", path).model == Model.define("0.9*x + v", "x + w")  # no matter what else is in the file
+    # no matter what else is in the file
+    assert find_variant("good", path).model == Model.define("0.9*x + v", "x + w")
     with pytest.warns(VariantWarning, match=r"^variant bad in") as warned:
         assert list(load_variants(path)) == ["good"]
     assert [str(one.message) for one in warned] == [message]
@@ -207,7 +237,10 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
 )
 def test_a_formula_cannot_execute_code(tmp_path, formula):
     marker, path = tmp_path / "marker", tmp_path / "mine.toml"
-    path.write_text(f'[variants.bad]\nstate = "{formula.format(marker=marker)}"\nmeter = "x + w"\n', encoding="utf-8")
+    path.write_text(
+        f'[variants.bad]\nstate = "{formula.format(marker=marker)}"\nmeter = "x + w"\n',
+        encoding="utf-8",
+    )
     with pytest.raises(VariantError, match=r"variant bad in .*mine\.toml"):
         load_variants(path)
     assert not marker.exists()
@@ -224,11 +257,15 @@ def test_a_formula_cannot_execute_code(tmp_path, formula):
         ("[variants.a]\nstate = c*x + v", "column 9); formulas and other texts stand in quotes"),
         (
             "[variants.a]\n" + GOOD + "parameters = { c = .9 }",
-            "column 20); formulas and other texts stand in quotes, and a number has a digit before its point",
+            "column 20); formulas and other texts stand in quotes, and a number has a digit "
+            "before its point",
         ),
         ("[variants.a]\n" + GOOD + "[variants.a]\n" + GOOD, "not valid TOML"),
         ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'9' * 10_000} }}", "is not valid TOML"),
-        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'[' * 5000}{']' * 5000} }}", "is not valid TOML"),
+        (
+            "[variants.a]\n" + GOOD + f"prior = {{ mean = {'[' * 5000}{']' * 5000} }}",
+            "is not valid TOML",
+        ),
         ("[variants]\nbad = 5", "variant bad in"),
         ("[[variants]]\n" + GOOD, "no variants"),
         (b"\xff\xfe", "cannot be read"),
@@ -247,10 +284,17 @@ def test_only_the_variants_asked_for_are_built(tmp_path, monkeypatch):
     path, built = tmp_path / "many.toml", []
     path.write_text("".join(f"[variants.{i}]\n{GOOD}" for i in range(5000)), encoding="utf-8")
     whole = of_variants.read_variant
-    monkeypatch.setattr(of_variants, "read_variant", lambda name, *rest: built.append(name) or whole(name, *rest))
+    monkeypatch.setattr(
+        of_variants, "read_variant", lambda name, *rest: built.append(name) or whole(name, *rest)
+    )
     assert find_variant("4711", path).name == "4711" and built == ["4711"]
-    assert [one.name for one in chosen_variants(["7", "3", "7"], False, path)] == ["7", "3"] and built[1:] == ["7", "3"]
-    with pytest.raises(VariantError, match=r"no variant 'x'; there are 0, 1, .*39, \.\.\. \(5000 in all\)$"):
+    assert [one.name for one in chosen_variants(["7", "3", "7"], False, path)] == [
+        "7",
+        "3",
+    ] and built[1:] == ["7", "3"]
+    with pytest.raises(
+        VariantError, match=r"no variant 'x'; there are 0, 1, .*39, \.\.\. \(5000 in all\)$"
+    ):
         find_variant("x", path)
 
 
@@ -270,8 +314,14 @@ def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
 def test_models_that_all_jump_are_no_empty_list(tmp_path):
     path = tmp_path / "mine.toml"
     modes = "[variants.a.modes.one.parameters]\nC = 1\n[variants.a.modes.two.parameters]\nC = 2\n"
-    path.write_text('[variants.a]\nstate = "0.9*x + v"\nmeter = "x + C*w"\ntransition = [0.5, 0.5]\n' + modes, encoding="utf-8")
-    with pytest.raises(VariantError, match=r"has no other variants than those that jump .*`read_variants` reads them"):
+    path.write_text(
+        '[variants.a]\nstate = "0.9*x + v"\nmeter = "x + C*w"\ntransition = [0.5, 0.5]\n' + modes,
+        encoding="utf-8",
+    )
+    with pytest.raises(
+        VariantError,
+        match=r"has no other variants than those that jump .*`read_variants` reads them",
+    ):
         load_variants(path)
     assert [*read_variants(path)[0]] == ["a"]
 
@@ -280,23 +330,34 @@ def test_time_inputs_and_angles_are_read_and_the_exercises_say_what_they_cannot_
     path = tmp_path / "mine.toml"
     path.write_text(
         '[variants.drive]\nstate = "0.9*x + u + 0.3*v + (1 if t < 1 else 0)"\nmeter = "x + w"\n'
-        'inputs = { u = [0, 1, -1] }\ninterval = 0.5\nmeter_noise = { variance = "1 + k/10" }\nangles = ["y"]\n',
+        'inputs = { u = [0, 1, -1] }\ninterval = 0.5\nmeter_noise = { variance = "1 + k/10" '
+        '}\nangles = ["y"]\n',
         encoding="utf-8",
     )
     model = find_variant("drive", path).model
-    assert model.known.inputs == {"u": (0.0, 1.0, -1.0)} and model.known.at(2).tolist() == [2.0, 1.0, -1.0]
+    assert model.known.inputs == {"u": (0.0, 1.0, -1.0)} and model.known.at(2).tolist() == [
+        2.0,
+        1.0,
+        -1.0,
+    ]
     assert model.angles.y == (0,)
     finding = unposed(find_variant("drive", path))
     assert finding is not None and finding.ok is False
     assert "an input of variant drive ends after 3" in finding.says
     table = tomllib.loads(path.read_text(encoding="utf-8"))["variants"]["drive"]
-    with pytest.raises(ExerciseError, match=r"a model without angles in the measurement.*take another variant"):
+    with pytest.raises(
+        ExerciseError, match=r"a model without angles in the measurement.*take another variant"
+    ):
         exercise("b", table)
     del table["angles"]
-    with pytest.raises(ExerciseError, match=r"an input of variant own ends after 3.*a value for every step"):
+    with pytest.raises(
+        ExerciseError, match=r"an input of variant own ends after 3.*a value for every step"
+    ):
         exercise("b", table)
     table["inputs"] = {"u": [0.0, 1.0, -1.0] * 7}
     assert exercise("b", table).model.known.steps == 21
-    path.write_text('[variants.v]\nstate = "x + u + v"\nmeter = "x + w"\ninputs = 3\n', encoding="utf-8")
+    path.write_text(
+        '[variants.v]\nstate = "x + u + v"\nmeter = "x + w"\ninputs = 3\n', encoding="utf-8"
+    )
     with pytest.raises(VariantError, match="`inputs` must be a table"):
         find_variant("v", path)

@@ -1,4 +1,5 @@
-"""Variants with modes on the command line: listed, checked, compared, and refused where nothing knows modes."""
+"""Variants with modes on the command line: listed, checked, compared, and refused where nothing
+knows modes."""
 
 import json
 import re
@@ -13,7 +14,13 @@ from kfcourse import JumpModel, cli, load_variants, simulate
 from kfcourse.filters import logic_dynamic, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
-from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants, summary
+from kfcourse.lab.variants import (
+    VariantError,
+    chosen_variants,
+    find_variant,
+    read_variants,
+    summary,
+)
 from kfcourse.montecarlo.modes import recognised
 from kfcourse.notebooks import handing_out
 from kfcourse.notebooks.jobs import Outcome
@@ -47,7 +54,9 @@ def own(tmp_path):
 def test_they_are_shipped_beside_the_variants_that_the_exercises_ask_about(own):
     assert list(JUMPS) == ["J1", "J1-lasting", "J1-overload", "J2", "J-switching", "J3", "J4"]
     assert not set(JUMPS) & set(load_variants())
-    assert list(load_variants(own)) == ["plain"] and isinstance(find_variant("mine", own).model, JumpModel)
+    assert list(load_variants(own)) == ["plain"] and isinstance(
+        find_variant("mine", own).model, JumpModel
+    )
     assert [one.name for one in chosen_variants([], True, own)] == ["plain"]
 
 
@@ -70,12 +79,26 @@ def test_each_has_its_filters_and_finite_trajectories(name):
 def test_the_published_model_has_the_law_of_its_modes():
     model = JUMPS["J-switching"].model
     np.testing.assert_allclose(model.law_at(7), [0.25, 0.5, 0.25])
-    assert [[float(mode.parameters[key]) for key in "ds"] for mode in model.modes] == [[4, 1], [1, 1], [0.5, 3]]
+    assert [[float(mode.parameters[key]) for key in "ds"] for mode in model.modes] == [
+        [4, 1],
+        [1, 1],
+        [0.5, 3],
+    ]
 
 
 def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, own):
     few = ("--runs", 2000, "--steps", 6)
-    result = kfcourse("lab", "mine", "--variants", own, *few, "--out", tmp_path / "r", "--json", tmp_path / "n.json")
+    result = kfcourse(
+        "lab",
+        "mine",
+        "--variants",
+        own,
+        *few,
+        "--out",
+        tmp_path / "r",
+        "--json",
+        tmp_path / "n.json",
+    )
     assert result.exit_code == 0, result.output
     for name in JUMP_LAB:
         assert title(name) in result.output
@@ -85,7 +108,10 @@ def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, o
         assert "sound" in text and "faulty" in text
     assert (tmp_path / "r" / "modes.svg").is_file()
     numbers = json.loads((tmp_path / "n.json").read_text())
-    assert list(numbers["model"]["modes"]) == ["sound", "faulty"] and numbers["model"]["first"] == [1, 0]
+    assert list(numbers["model"]["modes"]) == ["sound", "faulty"] and numbers["model"]["first"] == [
+        1,
+        0,
+    ]
     gaps = {name: gap["value"] for name, gap in numbers["mean_above_bound"].items()}
     assert gaps["gpb2"] < gaps["aof-jump-gaussian"] < gaps["aof-averaged"]
 
@@ -101,7 +127,10 @@ def test_listed_and_checked(own):
         "        cubic: x' = x + v;  y = x**3 + C*w;  C = 2",
     ]
     checked = kfcourse("variants", "--variants", own, "--variant", "mine", "--check", "--runs", 256)
-    assert checked.exit_code == 0 and "has 2 modes: only whether it is bounded is checked" in checked.output
+    assert (
+        checked.exit_code == 0
+        and "has 2 modes: only whether it is bounded is checked" in checked.output
+    )
 
 
 def test_filters_are_told_for_modes():
@@ -110,7 +139,10 @@ def test_filters_are_told_for_modes():
     assert "LD-GFKP4" in told and "LD-LFBP4" in told
     assert title("fbp2-jump-linearised") == "LD-LFBP2"
     wrong = kfcourse("lab", "J1", "--filters", "aof-gaussian")
-    assert wrong.exit_code == 1 and "unknown filter 'aof-gaussian'; known: aof-jump-gaussian" in wrong.output
+    assert (
+        wrong.exit_code == 1
+        and "unknown filter 'aof-gaussian'; known: aof-jump-gaussian" in wrong.output
+    )
 
 
 def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
@@ -120,40 +152,71 @@ def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
         ("estimate", tmp_path / "y.csv", "--model", own, "--variant", "mine"),
     ):
         result = kfcourse(*arguments)
-        assert result.exit_code != 0 and "jumps between modes" in result.output, (arguments, result.output)
+        assert result.exit_code != 0 and "jumps between modes" in result.output, (
+            arguments,
+            result.output,
+        )
         assert "Traceback" not in result.output
-    with pytest.raises(VariantError, match=r"jumps between modes.*`kfcourse lab J1`.*--variants FILE"):
+    with pytest.raises(
+        VariantError, match=r"jumps between modes.*`kfcourse lab J1`.*--variants FILE"
+    ):
         find_variant("J1").plain("the exercises")
 
 
 def test_nobody_gets_a_variant_with_modes_and_it_is_said(tmp_path, own, monkeypatch):
-    monkeypatch.setattr(handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
+    monkeypatch.setattr(
+        handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work]
+    )
     (tmp_path / "list.csv").write_text("name,group\nA,1\nB,1\n")
     command = ("exercises", "--variants", own, "--sets", "a", "--out", tmp_path / "e")
     for whom in (["--all"], ["--students", tmp_path / "list.csv"]):
         result = kfcourse(*command, *whom)
-        assert result.exit_code == 0 and re.search("Left out, since they jump between modes.*: mine\n", result.output)
+        assert result.exit_code == 0 and re.search(
+            "Left out, since they jump between modes.*: mine\n", result.output
+        )
     assert "mine" not in (tmp_path / "e" / "assignment.csv").read_text()
     named = kfcourse(*command, "--variant", "plain")
     assert named.exit_code == 0 and "Left out" not in named.output
-    several = kfcourse("exercises", "--variants", own, "--sets", "a,b", "--out", tmp_path / "e", "--variant", "mine")
+    several = kfcourse(
+        "exercises",
+        "--variants",
+        own,
+        "--sets",
+        "a,b",
+        "--out",
+        tmp_path / "e",
+        "--variant",
+        "mine",
+    )
     assert several.exit_code == 1 and several.output.count("jumps between modes") == 1
 
     own.write_text(OWN.partition("[variants.plain]")[0])
     for whom in (["--all"], ["--students", tmp_path / "list.csv"]):
         result = kfcourse(*command, *whom)
-        assert result.exit_code == 1 and "no other variants than those that jump between modes" in result.output
+        assert (
+            result.exit_code == 1
+            and "no other variants than those that jump between modes" in result.output
+        )
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [("0.1], [0.4", "0.2], [0.4"), ("first = [1, 0]", "first = [1, 1]"), ("first = [1, 0]\n", ""), ("transition", "transitions")],
+    [
+        ("0.1], [0.4", "0.2], [0.4"),
+        ("first = [1, 0]", "first = [1, 1]"),
+        ("first = [1, 0]\n", ""),
+        ("transition", "transitions"),
+    ],
 )
 def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
     path = tmp_path / "wrong.toml"
     path.write_text(OWN.replace(change, message))
     result = kfcourse("lab", "mine", "--variants", path)
-    assert result.exit_code == 1 and "variant mine in" in result.output and "Traceback" not in result.output
+    assert (
+        result.exit_code == 1
+        and "variant mine in" in result.output
+        and "Traceback" not in result.output
+    )
 
 
 def test_the_share_of_right_modes_is_that_of_the_trajectories():

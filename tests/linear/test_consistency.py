@@ -1,4 +1,5 @@
-"""Consistency tests against the loops of the page; whether they find what is wrong is tested with records."""
+"""Consistency tests against the loops of the page; whether they find what is wrong is tested with
+records."""
 
 import numpy as np
 import pytest
@@ -29,13 +30,16 @@ RUNS, STEPS = 2000, 12
 
 
 def tracking(**noise) -> Model:
-    """Two components, two correlated measurements, noises with means; `noise` scales the two standard deviations."""
+    """Two components, two correlated measurements, noises with means; `noise` scales the two
+    standard deviations."""
     return Model.define(
-        ["x1 + 0.5*x2 + 0.2*q*v1", "0.9*x2 + 0.3*q*v2"], ["x1 + r*w1", "x2 - x1 + 0.5*r*w2"], {"q": 1, "r": 1} | noise,
+        ["x1 + 0.5*x2 + 0.2*q*v1", "0.9*x2 + 0.3*q*v2"],
+        ["x1 + r*w1", "x2 - x1 + 0.5*r*w2"],
+        {"q": 1, "r": 1} | noise,
         prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
         state_noise={"mean": [0.1, 0], "variance": [[1, 0.3], [0.3, 2]]},
         meter_noise={"mean": [0, 0.4], "variance": [[1, 0.6], [0.6, 2]]},
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,12 +58,19 @@ def test_the_normalised_square_is_the_loop_of_the_page():
     rng = np.random.default_rng(1)
     root, vector = rng.normal(size=(4, 3, 2, 2)), rng.normal(size=(4, 3, 2))
     cov = root @ root.swapaxes(-1, -2) + 0.1 * np.eye(2)
-    expected = [[v @ np.linalg.inv(P) @ v for v, P in zip(*row, strict=True)] for row in zip(vector, cov, strict=True)]
+    expected = [
+        [v @ np.linalg.inv(P) @ v for v, P in zip(*row, strict=True)]
+        for row in zip(vector, cov, strict=True)
+    ]
     # two products of 2 x 2 matrices whose condition is below 1e3
     np.testing.assert_allclose(normalised_square(vector, cov), expected, rtol=1e-12)
     shared = normalised_square(vector, cov[0, 0])  # one covariance for all
-    np.testing.assert_allclose(shared[2, 1], vector[2, 1] @ np.linalg.inv(cov[0, 0]) @ vector[2, 1], rtol=1e-12)
-    np.testing.assert_allclose(nees(vector, Gaussian(0.5 * vector, cov)), np.array(expected) / 4, rtol=1e-12)
+    np.testing.assert_allclose(
+        shared[2, 1], vector[2, 1] @ np.linalg.inv(cov[0, 0]) @ vector[2, 1], rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        nees(vector, Gaussian(0.5 * vector, cov)), np.array(expected) / 4, rtol=1e-12
+    )
     np.testing.assert_allclose(nis(Innovations(vector, cov)), expected, rtol=1e-12)
 
 
@@ -75,16 +86,26 @@ def test_innovations_are_measurements_less_predictions(paths):
     value, cov = found(model, paths.y)
     for k, i in ((0, 0), (3, 17), (STEPS - 1, RUNS - 1)):
         P = predicted.cov[k, i]
-        np.testing.assert_allclose(value[k, i], paths.y[k, i] - system.H @ predicted.mean[k, i] - offset, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(
-            np.broadcast_to(cov, (STEPS, RUNS, 2, 2))[k, i], system.H @ P @ system.H.T + system.R, rtol=1e-12
+            value[k, i],
+            paths.y[k, i] - system.H @ predicted.mean[k, i] - offset,
+            rtol=1e-12,
+            atol=1e-12,
+        )
+        np.testing.assert_allclose(
+            np.broadcast_to(cov, (STEPS, RUNS, 2, 2))[k, i],
+            system.H @ P @ system.H.T + system.R,
+            rtol=1e-12,
         )
 
 
 # ---------------------------------------------------------------- bounds
 
 
-@pytest.mark.parametrize("arguments", [(0, 5), (2, 0), (2, 5, 0.0), (2, 5, 1.0), (2, 5, 95), (-1, 5), (2, 5, float("nan"))])
+@pytest.mark.parametrize(
+    "arguments",
+    [(0, 5), (2, 0), (2, 5, 0.0), (2, 5, 1.0), (2, 5, 95), (-1, 5), (2, 5, float("nan"))],
+)
 def test_bounds_of_nothing_are_refused(arguments):
     with pytest.raises(ValueError, match="expected degrees >= 1, runs >= 1 and 0 < confidence < 1"):
         chi_squared_bounds(*arguments)
@@ -98,14 +119,19 @@ def test_the_autocorrelation_is_the_loop_of_the_page():
     value, root = rng.normal(size=(6, 4, 2)), rng.normal(size=(6, 4, 2, 2))
     cov = root @ root.swapaxes(-1, -2) + 0.1 * np.eye(2)
     white = [
-        [scipy.linalg.solve_triangular(np.linalg.cholesky(cov[k, i]), value[k, i], lower=True) for i in range(4)]
+        [
+            scipy.linalg.solve_triangular(np.linalg.cholesky(cov[k, i]), value[k, i], lower=True)
+            for i in range(4)
+        ]
         for k in range(6)
     ]
     result = autocorrelation(Innovations(value, cov), 3)
     for lag in (1, 2, 3):
         products = [white[k][i] @ white[k + lag][i] / 2 for k in range(6 - lag) for i in range(4)]
         np.testing.assert_allclose(result.value[lag - 1], np.mean(products), rtol=1e-12, atol=1e-14)
-        np.testing.assert_allclose(result.standard_deviation[lag - 1], 1 / np.sqrt(2 * len(products)), rtol=1e-14)
+        np.testing.assert_allclose(
+            result.standard_deviation[lag - 1], 1 / np.sqrt(2 * len(products)), rtol=1e-14
+        )
 
 
 @pytest.mark.parametrize("lags", [0, -1, 4, 10])
@@ -134,10 +160,18 @@ def test_the_alarms_are_the_sums_of_the_page():
         total = sum(float(one @ one) for one in s)
         s = s / np.sqrt(total / (2 * steps))
         neighbours = sum(s[k] @ s[k + 1] for k in range(steps - 1))
-        expected[0, i] = not scipy.stats.chi2.ppf(0.1, 2 * steps) <= total <= scipy.stats.chi2.ppf(0.9, 2 * steps)
+        expected[0, i] = (
+            not scipy.stats.chi2.ppf(0.1, 2 * steps)
+            <= total
+            <= scipy.stats.chi2.ppf(0.9, 2 * steps)
+        )
         expected[1, i] = s.sum(axis=0) @ s.sum(axis=0) / steps > scipy.stats.chi2.ppf(0.8, 2)
         expected[2, i] = neighbours**2 / (2 * (steps - 1)) > scipy.stats.chi2.ppf(0.8, 1)
-    assert np.array_equal(found, expected) and expected.any(axis=1).all() and not expected.all(axis=1).any()
+    assert (
+        np.array_equal(found, expected)
+        and expected.any(axis=1).all()
+        and not expected.all(axis=1).any()
+    )
 
 
 def test_alarms_refuse_records_with_gaps_and_single_steps():
@@ -156,7 +190,8 @@ def test_a_confidence_ellipse_is_a_level_of_the_chi_squared_law():
     law = Gaussian(np.array([3.0, -1.0]), np.array([[2.0, 1.9], [1.9, 2.0]]))
     off = (confidence_ellipse(law, 0.9, points=7) - law.mean[:, None]).T
     level = np.einsum("ki,ij,kj->k", off, np.linalg.inv(law.cov), off)
-    np.testing.assert_allclose(level, scipy.stats.chi2.ppf(0.9, 2), rtol=1e-12)  # an inverse of condition 40
+    # an inverse of condition 40
+    np.testing.assert_allclose(level, scipy.stats.chi2.ppf(0.9, 2), rtol=1e-12)
 
 
 def test_a_confidence_ellipse_is_refused_in_words():

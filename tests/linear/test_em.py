@@ -12,13 +12,18 @@ pytestmark = pytest.mark.quick
 
 def log_density(system, prior, y):
     """ln p(y) of all runs, each by one dense regression."""
-    steps = [(system.A, np.zeros(len(system.A)), system.Q, system.H, np.zeros(len(system.H)), system.R)] * len(y)
+    steps = [
+        (system.A, np.zeros(len(system.A)), system.Q, system.H, np.zeros(len(system.H)), system.R)
+    ] * len(y)
     return sum(oracles.joint_posterior(steps, prior, y[:, i])[2] for i in range(y.shape[1]))
 
 
 def two_states():
     system = LinearSystem(
-        np.array([[0.9, 0.4], [-0.2, 0.8]]), np.array([[1.0, 0.5]]), np.array([[0.5, 0.1], [0.1, 0.3]]), np.array([[0.4]])
+        np.array([[0.9, 0.4], [-0.2, 0.8]]),
+        np.array([[1.0, 0.5]]),
+        np.array([[0.5, 0.1], [0.1, 0.3]]),
+        np.array([[0.4]]),
     )
     prior = Gaussian(np.array([1.0, -1.0]), np.array([[1.0, 0.2], [0.2, 0.5]]))
     y = simulate(system, prior, 25, 3, seed=1).y.copy()
@@ -34,7 +39,8 @@ def test_no_round_lowers_the_likelihood():
 
 
 def test_each_round_climbs_in_the_direction_of_the_gradient():
-    """The first round's change and the likelihood's slope along it have a known relation: M[ln p(x, y)] has the same slope."""
+    """The first round's change and the likelihood's slope along it have a known relation: M[ln p(x,
+    y)] has the same slope."""
     start, prior, y = two_states()
     first, second = em_rounds(start, prior, y, 1)
     e, ahead, behind = 1e-4, [], []
@@ -58,5 +64,8 @@ def test_what_it_cannot_use_is_refused():
     half = np.zeros((3, 1, 2))
     half[1, 0, 0] = np.nan
     for system, bad in ((both, half), (start, np.full((3, 1, 1), np.nan)), (start, y[:1])):
-        with pytest.raises(ValueError, match="needs two steps or more, and measurements that are there or missing as a whole"):
+        with pytest.raises(
+            ValueError,
+            match="needs two steps or more, and measurements that are there or missing as a whole",
+        ):
             em_rounds(system, prior, bad, 1)

@@ -1,4 +1,5 @@
-"""The linear Kalman filter in five arithmetic forms, covariance analysis and steady state, against independent references."""
+"""The linear Kalman filter in five arithmetic forms, covariance analysis and steady state, against
+independent references."""
 
 import control
 import numpy as np
@@ -10,7 +11,8 @@ from kfcourse.linear.arithmetic import FORMS
 
 pytestmark = pytest.mark.quick
 
-# Conditions of the covariances below are up to 1e4: rounding of float64 (1e-16) times that, over a dozen steps.
+# Conditions of the covariances below are up to 1e4: rounding of float64 (1e-16) times that, over a
+# dozen steps.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
 
 
@@ -104,7 +106,8 @@ def test_steady_state_against_python_control(case):
     found = steady_state(one)
     L, P, _ = control.dlqe(one.A, np.eye(len(one.A)), one.H, one.Q, one.R)
     np.testing.assert_allclose(found.predicted, P, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(one.A @ found.gain, L, rtol=1e-9, atol=1e-9)  # its gain is that of the prediction
+    # its gain is that of the prediction
+    np.testing.assert_allclose(one.A @ found.gain, L, rtol=1e-9, atol=1e-9)
     X, _, _ = control.dare(one.A.T, one.H.T, one.Q, one.R)
     np.testing.assert_allclose(found.predicted, X, rtol=1e-9, atol=1e-9)
 
@@ -112,7 +115,9 @@ def test_steady_state_against_python_control(case):
 @pytest.mark.parametrize("growth", [1.0, 1.1])
 def test_no_steady_state_of_what_is_not_seen(growth):
     with pytest.raises(ValueError, match=r"no stabilising solution.*covariances"):
-        steady_state(LinearSystem(np.diag([0.5, growth]), np.array([[1.0, 0]]), np.eye(2), np.eye(1)))
+        steady_state(
+            LinearSystem(np.diag([0.5, growth]), np.array([[1.0, 0]]), np.eye(2), np.eye(1))
+        )
 
 
 # ---------------------------------------------------------------- short words
@@ -120,18 +125,26 @@ def test_no_steady_state_of_what_is_not_seen(growth):
 
 @pytest.fixture(scope="module")
 def ill_conditioned():
-    """Position, velocity, acceleration; a meter of 1 mm, 300 starts known to a kilometre, in float32; and the right answer."""
+    """Position, velocity, acceleration; a meter of 1 mm, 300 starts known to a kilometre, in
+    float32; and the right answer."""
     dt, rng = 0.1, np.random.default_rng(2)
     A = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
-    short = LinearSystem(A, np.array([[1.0, 0, 0]]), np.diag([0, 0, 1e-6]), np.array([[1e-6]])).astype(np.float32)
-    y = simulate(short.astype(float), Gaussian(np.zeros(3), 0.01 * np.eye(3)), 40, 300, seed=3).y.astype(np.float32)
-    prior = Gaussian(np.zeros(3), 1e6 * 10 ** rng.uniform(-0.5, 0.5, (300, 3))[:, :, None] * np.eye(3))
+    short = LinearSystem(
+        A, np.array([[1.0, 0, 0]]), np.diag([0, 0, 1e-6]), np.array([[1e-6]])
+    ).astype(np.float32)
+    y = simulate(
+        short.astype(float), Gaussian(np.zeros(3), 0.01 * np.eye(3)), 40, 300, seed=3
+    ).y.astype(np.float32)
+    prior = Gaussian(
+        np.zeros(3), 1e6 * 10 ** rng.uniform(-0.5, 0.5, (300, 3))[:, :, None] * np.eye(3)
+    )
     right = run(short.astype(float), prior, y.astype(float), arithmetic="square-root").posterior
     return short, prior, y, right
 
 
 def lost(mean, right, since=0):
-    """Share of the runs in which the estimate is more than three standard deviations from the right one at some step."""
+    """Share of the runs in which the estimate is more than three standard deviations from the right
+    one at some step."""
     sd = np.sqrt(np.diagonal(right.cov, axis1=-2, axis2=-1))
     return (abs(mean - right.mean)[since:] > 3 * sd[since:]).any(axis=(0, 2)).mean()
 
@@ -141,8 +154,11 @@ def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned
     short, prior, y, right = ill_conditioned
     laws = run(short, prior, y, arithmetic=arithmetic).posterior
     assert lost(laws.mean, right) == 0
-    # The condition number of the root is 1e6: with rounding of 6e-8 and 40 steps, below 0.3 for all 300 starts.
-    np.testing.assert_allclose(laws.cov[5:], right.cov[5:], rtol=0.3, atol=0.3 * abs(right.cov[5:]).max())
+    # The condition number of the root is 1e6: with rounding of 6e-8 and 40 steps, below 0.3 for all
+    # 300 starts.
+    np.testing.assert_allclose(
+        laws.cov[5:], right.cov[5:], rtol=0.3, atol=0.3 * abs(right.cov[5:]).max()
+    )
     assert (np.diagonal(laws.cov, axis1=-2, axis2=-1) >= 0).all()
 
 
@@ -151,7 +167,8 @@ def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned
 
 def test_the_ud_form_takes_a_meter_without_noise():
     silent = LinearSystem(**(GOOD | {"R": np.zeros((1, 1)), "Q": np.zeros((2, 2))}))
-    laws = run(silent, GOOD_PRIOR, np.ones((3, 1, 1)), arithmetic="ud").posterior  # the same measurement three times
+    # the same measurement three times
+    laws = run(silent, GOOD_PRIOR, np.ones((3, 1, 1)), arithmetic="ud").posterior
     np.testing.assert_allclose(laws.mean[:, 0], 0.5, rtol=1e-14)
     np.testing.assert_allclose(laws.cov[:, 0], [[[0.5, -0.5], [-0.5, 0.5]]] * 3, rtol=1e-14)
 
@@ -165,7 +182,11 @@ GOOD = {"A": np.eye(2), "H": np.ones((1, 2)), "Q": np.eye(2), "R": np.eye(1), "B
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("A", np.ones((2, 3)), r"A has the shape \(2, 3\); with 2 states and 1 measurements it is \(2, 2\)"),
+        (
+            "A",
+            np.ones((2, 3)),
+            r"A has the shape \(2, 3\); with 2 states and 1 measurements it is \(2, 2\)",
+        ),
         ("B", np.ones((3, 1)), "B has 3 rows; with 2 states it has 2"),
         ("A", np.array([[1, np.nan], [0, 1]]), "A must be finite"),
         ("Q", np.array([[1, 0.5], [0, 1]]), "Q is a covariance and must be symmetric"),
@@ -190,11 +211,18 @@ GOOD_PRIOR = Gaussian(np.zeros(2), np.eye(2))
         ({"u": np.full((4, 3, 1), np.nan)}, "inputs must be finite"),
         ({"prior": Gaussian(np.zeros(3), np.eye(2))}, "prior's mean must have the shape"),
         ({"prior": Gaussian(np.zeros(2), -np.eye(2))}, "prior's variances must not be negative"),
-        ({"arithmetic": "exact"}, "no form 'exact' of the Kalman filter; known: covariance, symmetrised"),
+        (
+            {"arithmetic": "exact"},
+            "no form 'exact' of the Kalman filter; known: covariance, symmetrised",
+        ),
     ],
 )
 def test_arguments_that_do_not_fit(change, message):
-    arguments = {"system": LinearSystem(**GOOD), "prior": GOOD_PRIOR, "y": np.zeros((4, 3, 1))} | change
+    arguments = {
+        "system": LinearSystem(**GOOD),
+        "prior": GOOD_PRIOR,
+        "y": np.zeros((4, 3, 1)),
+    } | change
     with pytest.raises(ValueError, match=message):
         run(**arguments)
 
@@ -202,9 +230,18 @@ def test_arguments_that_do_not_fit(change, message):
 def test_sizes_and_gains_that_do_not_fit():
     one = LinearSystem(**GOOD)
     for call, message in (
-        (lambda: simulate(one, GOOD_PRIOR, 0, 3, 1), "steps must be a positive whole number, got 0"),
-        (lambda: covariances(one, np.eye(3), 4), r"prior's covariance must have the shape \(2, 2\), got \(3, 3\)"),
-        (lambda: covariances(one, np.eye(2), 4, np.ones(2)), r"gains must have the shape \(4, 2, 1\) or \(2, 1\), got \(2,\)"),
+        (
+            lambda: simulate(one, GOOD_PRIOR, 0, 3, 1),
+            "steps must be a positive whole number, got 0",
+        ),
+        (
+            lambda: covariances(one, np.eye(3), 4),
+            r"prior's covariance must have the shape \(2, 2\), got \(3, 3\)",
+        ),
+        (
+            lambda: covariances(one, np.eye(2), 4, np.ones(2)),
+            r"gains must have the shape \(4, 2, 1\) or \(2, 1\), got \(2,\)",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             call()

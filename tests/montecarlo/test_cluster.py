@@ -21,10 +21,11 @@ def address():
 
 
 def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, variant53, tmp_path):
-    """The first worker to take a piece ends; what it had begun is done by another, with the same result.
+    """The first worker to take a piece ends; what it had begun is done by another, with the same
+    result.
 
-    A process that compiles the exact filter and one that finds it compiled round differently: 1e-15 of an estimate, 1e-10 of
-    the filter's own error, which is a small difference of two.
+    A process that compiles the exact filter and one that finds it compiled round differently: 1e-15
+    of an estimate, 1e-10 of the filter's own error, which is a small difference of two.
     """
     one, lost = aof(gaussian(variant53)), tmp_path / "lost"
 
@@ -37,10 +38,14 @@ def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, vari
 
     filters = [*lab_filters(variant53, LAB[1:]), pointmass(variant53)]
     here = compare([one, *filters], variant53, 200, 3, 1, jobs=1, progress=False)
-    there = compare([replace(one, step=step), *filters], variant53, 200, 3, 1, dask=address, progress=False)
+    there = compare(
+        [replace(one, step=step), *filters], variant53, 200, 3, 1, dask=address, progress=False
+    )
     assert lost.exists()
     for name, sums, others in zip(here.sums._fields, here.sums, there.sums, strict=True):
-        np.testing.assert_allclose(others, sums, rtol=1e-8 if name == "doubt" else 1e-12, err_msg=name)
+        np.testing.assert_allclose(
+            others, sums, rtol=1e-8 if name == "doubt" else 1e-12, err_msg=name
+        )
 
 
 def test_checks_of_variants(address):
@@ -56,5 +61,8 @@ def test_what_is_no_address_is_said_before_there_is_a_client(monkeypatch, wrong)
 
 
 def test_nobody_answers():
-    with pytest.raises(ValueError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1:"), cluster("tcp://127.0.0.1:1"):
+    with (
+        pytest.raises(ValueError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1:"),
+        cluster("tcp://127.0.0.1:1"),
+    ):
         pass

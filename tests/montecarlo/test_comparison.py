@@ -1,4 +1,5 @@
-"""What a comparison reports: against direct per-trajectory formulas, theory, and the page's table."""
+"""What a comparison reports: against direct per-trajectory formulas, theory, and the page's
+table."""
 
 import re
 from dataclasses import replace
@@ -23,19 +24,23 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
-BATCH_ERROR = 1 / np.sqrt(2 * (BATCHES - 1))  # relative error of a standard error from so many batches
+# relative error of a standard error from so many batches
+BATCH_ERROR = 1 / np.sqrt(2 * (BATCHES - 1))
 
 
 @pytest.fixture(scope="module")
 def linear():
     return Model.define(
-        ["0.9*x1 + 0.2*x2 + 0.3*v1", "0.8*x2 + v2"], ["x1 + w1", "x2 - x1 + 0.5*w2"],
-        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]}, meter_noise={"variance": [[1, 0.2], [0.2, 2]]},
-    )  # fmt: skip
+        ["0.9*x1 + 0.2*x2 + 0.3*v1", "0.8*x2 + v2"],
+        ["x1 + w1", "x2 - x1 + 0.5*w2"],
+        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
+        meter_noise={"variance": [[1, 0.2], [0.2, 2]]},
+    )
 
 
 def stored(model, runs, steps, seed):
-    """The trajectories of compare(..., seed, same_ensemble=True): x (steps, runs, n) and y (steps, runs, p)."""
+    """The trajectories of compare(..., seed, same_ensemble=True): x (steps, runs, n) and y (steps,
+    runs, p)."""
     sizes = batch_sizes(runs)
     _, *seeds = np.random.SeedSequence(seed).spawn(1 + len(sizes))
     x, y, *_ = zip(*instants(model, sizes, steps, seeds), strict=True)
@@ -62,9 +67,12 @@ def direct(linear):
 
 
 def jackknife(function, *values):
-    """Value and standard error of a function of means of values (..., runs), from the definition: batch by batch left out."""
+    """Value and standard error of a function of means of values (..., runs), from the definition:
+    batch by batch left out."""
     batch = np.repeat(np.arange(BATCHES), batch_sizes(RUNS))
-    without = np.array([function(*(one[..., batch != b].mean(axis=-1) for one in values)) for b in range(BATCHES)])
+    without = np.array(
+        [function(*(one[..., batch != b].mean(axis=-1) for one in values)) for b in range(BATCHES)]
+    )
     error = np.sqrt((BATCHES - 1) / BATCHES * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
     return function(*(one.mean(axis=-1) for one in values)), error
 
@@ -76,7 +84,8 @@ def agree(estimate, function, *values):
 
 
 def of_mean(estimate, values):
-    """The estimate is the mean of per-trajectory values (..., runs), with the standard error they have."""
+    """The estimate is the mean of per-trajectory values (..., runs), with the standard error they
+    have."""
     agree(estimate, lambda mean: mean, values)
     exact = values.std(axis=-1) / np.sqrt(values.shape[-1])
     assert (abs(estimate.standard_error / exact - 1) < SIGMA * BATCH_ERROR).all()
@@ -90,14 +99,19 @@ def test_the_statistics_are_those_of_the_trajectories(direct):
         of_mean(result.component_variance(name), np.moveaxis(error**2, 1, -1))
         normalised = np.einsum("kni,knij,knj->kn", error, np.linalg.inv(cov), error) / 2
         of_mean(result.normalised_error(name), normalised)
-        np.testing.assert_allclose(result.own_variance(name).value, np.trace(cov, axis1=-2, axis2=-1).mean(axis=-1), rtol=1e-11)
+        np.testing.assert_allclose(
+            result.own_variance(name).value,
+            np.trace(cov, axis1=-2, axis2=-1).mean(axis=-1),
+            rtol=1e-11,
+        )
 
 
 @pytest.mark.filterwarnings("error")
 def test_the_normalised_error_of_a_scalar_filter_is_the_mean_of_e2_over_p():
     """A variance for each trajectory, one for all, and a vector of one component beside another.
 
-    A claim of variance 0 is right if there is no error (0), and infinitely wrong if there is (infinity).
+    A claim of variance 0 is right if there is no error (0), and infinitely wrong if there is
+    (infinity).
     """
     x = np.array([1.0, -2.0, 3.0, 0.5, -1.5])
     p = np.array([0.5, 2.0, 4.0, 0.25, 1.0])
@@ -105,21 +119,29 @@ def test_the_normalised_error_of_a_scalar_filter_is_the_mean_of_e2_over_p():
 
     def recorded(errors, cov):
         sums = Sums.empty(1, 1, errors.shape[1], 2)
-        sums.record(0, 0, errors, Gaussian(np.zeros_like(errors), cov), np.ones(5), np.array([0, 2]))
+        sums.record(
+            0, 0, errors, Gaussian(np.zeros_like(errors), cov), np.ones(5), np.array([0, 2])
+        )
         return sums.normalised[0, 0]
 
     def expected(quotients):
         return [quotients[:2].sum(), quotients[2:].sum()]
 
-    np.testing.assert_allclose(recorded(x[:, None], p[:, None, None]), expected(x**2 / p), rtol=1e-14)
-    np.testing.assert_allclose(recorded(x[:, None], np.array([[2.0]])), expected(x**2 / 2), rtol=1e-14)
+    np.testing.assert_allclose(
+        recorded(x[:, None], p[:, None, None]), expected(x**2 / p), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        recorded(x[:, None], np.array([[2.0]])), expected(x**2 / 2), rtol=1e-14
+    )
     pairs, covs = np.stack([x, still], axis=1), p[:, None, None] * np.eye(2)
     np.testing.assert_allclose(recorded(pairs, covs), expected(x**2 / p / 2), rtol=1e-14)
 
     certain = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
     known = np.where(certain > 0, x, 0.0)
     quotients = np.array([0.0, 2.0, 0.0, 1.0, 2.25])
-    np.testing.assert_allclose(recorded(known[:, None], certain[:, None, None]), expected(quotients), rtol=1e-14)
+    np.testing.assert_allclose(
+        recorded(known[:, None], certain[:, None, None]), expected(quotients), rtol=1e-14
+    )
     assert recorded(known[:, None], np.array([[0.0]])).tolist() == [np.inf, np.inf]
     assert recorded(still[:, None], np.array([[0.0]])).tolist() == [0, 0]
     assert recorded(x[:, None], certain[:, None, None]).tolist() == [np.inf, np.inf]
@@ -133,13 +155,21 @@ def test_differences_and_ratios_are_paired(direct):
     agree(result.gap("wrong"), lambda a, b: b / a - 1, ours, theirs)
     agree(result.score("wrong"), lambda a, b: (b / a).mean(), ours, theirs)
     agree(result.mean_gap("wrong", slice(2)), lambda a, b: (b / a)[:2].mean() - 1, ours, theirs)
-    agree(result.mean_gap_difference("wrong", "aof-gaussian"), lambda a, b: (b / a).mean() - 1, ours, theirs)
+    agree(
+        result.mean_gap_difference("wrong", "aof-gaussian"),
+        lambda a, b: (b / a).mean() - 1,
+        ours,
+        theirs,
+    )
 
 
 def test_pairing_pays(direct):
     result, _ = direct
     paired = result.difference("duof", "aof-gaussian").standard_error
-    separate = np.hypot(result.error_variance("duof").standard_error, result.error_variance("aof-gaussian").standard_error)
+    separate = np.hypot(
+        result.error_variance("duof").standard_error,
+        result.error_variance("aof-gaussian").standard_error,
+    )
     assert (paired < separate / 3).all()
 
 
@@ -155,7 +185,13 @@ def test_a_filter_does_not_differ_from_itself(direct):
 
 def test_an_unknown_name_is_answered_with_the_known_ones(direct):
     result, _ = direct
-    for ask in (result.error_variance, result.error_mean, result.normalised_error, result.relative, result.score):
+    for ask in (
+        result.error_variance,
+        result.error_mean,
+        result.normalised_error,
+        result.relative,
+        result.score,
+    ):
         with pytest.raises(KeyError, match="aof-gaussian, duof, wrong"):
             ask("ekf")
 
@@ -164,7 +200,10 @@ def test_the_optimal_filter_s_own_covariance_is_right_and_no_other_is_better(dir
     result, _ = direct
     normalised = result.normalised_error("aof-gaussian")
     assert (abs(normalised.value - 1) < SIGMA * normalised.standard_error).all()
-    claimed, actual = result.own_variance("aof-gaussian").value, result.error_variance("aof-gaussian")
+    claimed, actual = (
+        result.own_variance("aof-gaussian").value,
+        result.error_variance("aof-gaussian"),
+    )
     assert (abs(claimed - actual.value) < SIGMA * actual.standard_error).all()
     bias = result.error_mean("aof-gaussian")
     assert (abs(bias.value) < SIGMA * bias.standard_error).all()
@@ -200,23 +239,32 @@ def test_of_means_the_jackknife_is_the_usual_standard_error():
     sums = Sums.empty(1, 3, 1, 10)._replace(weight=np.ones(10), own=values[None])
     estimate = Estimate.jackknife(sums.means("own")[0])
     np.testing.assert_allclose(estimate.value, values.mean(axis=1), rtol=1e-13)
-    np.testing.assert_allclose(estimate.standard_error, values.std(axis=1, ddof=1) / np.sqrt(10), rtol=1e-13)
+    np.testing.assert_allclose(
+        estimate.standard_error, values.std(axis=1, ddof=1) / np.sqrt(10), rtol=1e-13
+    )
     assert estimate.freedom == 9
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say(linear):
-    """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors around 190."""
+    """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors
+    around 190."""
     one = kalman_filter(linear)
     truth = float(np.trace(one.step(one.init(1), np.zeros((1, 2))).posterior.cov))
     hits = 0
     for seed in range(200):
-        low, high = compare([one], linear, 400, 1, seed, jobs=1, progress=False).error_variance("kalman").interval(0.95)
+        low, high = (
+            compare([one], linear, 400, 1, seed, jobs=1, progress=False)
+            .error_variance("kalman")
+            .interval(0.95)
+        )
         hits += bool(low[0] < truth < high[0])
     assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
 
 
 def test_one_trajectory_has_no_standard_error(linear):
-    estimate = compare([kalman_filter(linear)], linear, 1, 2, seed=1, progress=False).error_variance("kalman")
+    estimate = compare(
+        [kalman_filter(linear)], linear, 1, 2, seed=1, progress=False
+    ).error_variance("kalman")
     assert np.isfinite(estimate.value).all()
     assert np.isnan(estimate.standard_error).all()
 
@@ -229,17 +277,23 @@ def test_every_half_of_the_initial_states_has_one_in_each_stratum(size):
     standard = stratified(np.random.default_rng(1), size, 2, 3.0)
     for half, scale in ((standard[::2], 1.0), (standard[1::2], 3.0)):
         strata = np.floor(len(half) * stats.norm.cdf(half / scale)).astype(int)
-        np.testing.assert_array_equal(np.sort(strata, axis=0), np.tile(np.arange(len(half))[:, None], (1, 2)))
+        np.testing.assert_array_equal(
+            np.sort(strata, axis=0), np.tile(np.arange(len(half))[:, None], (1, 2))
+        )
 
 
 def test_weights_make_up_for_the_wider_law():
-    """M 1, M x and M x^2 of the prior, singular or not, from 20,000 weighted states: four standard errors of each mean."""
+    """M 1, M x and M x^2 of the prior, singular or not, from 20,000 weighted states: four standard
+    errors of each mean."""
     rng = np.random.default_rng(1)
     for cov in (np.array([[4.0]]), np.array([[4.0, 1.0], [1.0, 1.0]]), np.diag([4.0, 0.0])):
         prior = Gaussian(np.arange(1.0, 1 + len(cov)), cov)
         values, vectors = np.linalg.eigh(cov)
         root = vectors * np.sqrt(np.maximum(values, 0))
-        standard = rng.standard_normal((20_000, len(cov))) * np.where(np.arange(20_000) % 2, 2.0, 1.0)[:, None]
+        standard = (
+            rng.standard_normal((20_000, len(cov)))
+            * np.where(np.arange(20_000) % 2, 2.0, 1.0)[:, None]
+        )
         x = prior.mean + standard @ root.T
         w = weights(prior, x, 2.0)
         assert w.min() > 0 and w.max() <= 2
@@ -252,11 +306,17 @@ def test_weights_make_up_for_the_wider_law():
 
 
 def by_hand(model, squares, own=None, distance=None):
-    """A comparison over one step from squared errors of each trajectory, name -> (runs,); each is a batch of its own."""
+    """A comparison over one step from squared errors of each trajectory, name -> (runs,); each is a
+    batch of its own."""
     names, runs = tuple(squares), len(next(iter(squares.values())))
     empty = Sums.empty(len(names), 1, 1, runs)
     square = np.array([*squares.values()])[:, None, None, :]
-    given = {"weight": np.ones(runs), "size": np.ones((1, runs)), "square": square, "largest": square[:, :, 0]}
+    given = {
+        "weight": np.ones(runs),
+        "size": np.ones((1, runs)),
+        "square": square,
+        "largest": square[:, :, 0],
+    }
     for field, values in (("own", own), ("distance", distance)):
         if values:
             given[field] = np.array([values[name] for name in names])[:, None, :]
@@ -265,23 +325,38 @@ def by_hand(model, squares, own=None, distance=None):
 
 @pytest.fixture
 def bounded(variant53):
-    squares = {"aof-gaussian": [2.0, 4, 6, 8], "other": [3.0, 5, 4, 12], "aof-exact": [9.0, 9, 9, 9]}
+    squares = {
+        "aof-gaussian": [2.0, 4, 6, 8],
+        "other": [3.0, 5, 4, 12],
+        "aof-exact": [9.0, 9, 9, 9],
+    }
     own = {"aof-gaussian": [4.0, 5, 5, 6], "other": [1.0, 1, 1, 1], "aof-exact": [3.5, 4.5, 4, 4]}
-    distance = {"aof-gaussian": [0.25, 0.75, 0.5, 0.5], "other": [1.0, 2, 1, 2], "aof-exact": [0.0, 0, 0, 0]}
+    distance = {
+        "aof-gaussian": [0.25, 0.75, 0.5, 0.5],
+        "other": [1.0, 2, 1, 2],
+        "aof-exact": [0.0, 0, 0, 0],
+    }
     return by_hand(variant53, squares, own, distance)
 
 
 def test_all_follows_from_the_bound_and_the_distances_from_it(bounded):
-    """Bound 4, distances .5 and 1.5; the exact filter's own squares of the error, 9, are never looked at."""
+    """Bound 4, distances .5 and 1.5; the exact filter's own squares of the error, 9, are never
+    looked at."""
     assert bounded.bound().value.item() == bounded.error_variance("aof-exact").value.item() == 4
     assert bounded.error_variance("other").value.item() == 5.5
     assert bounded.excess("other").value.item() == 1.5
     assert bounded.difference("other", "aof-gaussian").value.item() == 1
     assert bounded.gap("other").value.item() == bounded.mean_gap("other").value == 1.5 / 4
-    assert bounded.gap_difference("other", "aof-gaussian").value.item() == pytest.approx(1 / 4, rel=1e-14)
+    assert bounded.gap_difference("other", "aof-gaussian").value.item() == pytest.approx(
+        1 / 4, rel=1e-14
+    )
     distances = np.array([1.0, 2, 1, 2])
-    np.testing.assert_allclose(bounded.excess("other").standard_error, distances.std(ddof=1) / 2, rtol=1e-13)
-    assert [name for name, _ in bounded.ranking()] == ["aof-gaussian", "other"] == [*bounded.entrants]
+    np.testing.assert_allclose(
+        bounded.excess("other").standard_error, distances.std(ddof=1) / 2, rtol=1e-13
+    )
+    assert (
+        [name for name, _ in bounded.ranking()] == ["aof-gaussian", "other"] == [*bounded.entrants]
+    )
     assert bounded.reference == "aof-exact" and bounded.control == "aof-gaussian"
 
 
@@ -294,7 +369,8 @@ def test_without_the_exact_filter_there_is_no_bound(variant53):
 
 
 def test_what_is_better_than_the_exact_filter_refutes_it(variant53):
-    """Squares 1 +- .1 of a filter where the exact one claims 4; or that states an error of its own of a fifth of its variance."""
+    """Squares 1 +- .1 of a filter where the exact one claims 4; or that states an error of its own
+    of a fifth of its variance."""
     rng = np.random.default_rng(1)
     squares = {"aof-gaussian": 1 + 0.1 * rng.normal(size=50), "aof-exact": np.ones(50)}
     own = {"aof-gaussian": np.ones(50), "aof-exact": np.full(50, 4.0)}
@@ -307,7 +383,8 @@ def test_what_is_better_than_the_exact_filter_refutes_it(variant53):
 
 
 def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
-    """A thousand trajectories with the square 1, and one of 1e6 in one filter; another errs as much on all of them."""
+    """A thousand trajectories with the square 1, and one of 1e6 in one filter; another errs as much
+    on all of them."""
     base = np.ones(1000)
     wild = np.where(np.arange(1000) == 7, 1e6, base)
     result = by_hand(variant53, {"aof-gaussian": wild, "good": base, "bad": 1000 * base})
@@ -327,12 +404,14 @@ def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
 
 
 def test_the_particles_own_error_is_not_in_the_bound(linear):
-    """The Kalman filter is exact: what distances tell is the particles' error, of which a product of both halves holds little."""
+    """The Kalman filter is exact: what distances tell is the particles' error, of which a product
+    of both halves holds little."""
     exact = replace(particle(linear, 100), name="aof-exact")
     result = compare([kalman_filter(linear), exact], linear, 12_800, 1, seed=1, progress=False)
     excess = result.excess("kalman")
     doubt = result.sums.means("doubt")[:, 0]
-    # The clouds of each batch draw the same numbers: 200 independent products, of errors whose mean square is twice the doubt.
+    # The clouds of each batch draw the same numbers: 200 independent products, of errors whose mean
+    # square is twice the doubt.
     allowed = SIGMA * np.hypot(excess.standard_error, 2 * doubt / np.sqrt(200))
     assert (abs(excess.value) < allowed).all()
     assert (doubt > allowed).all()
@@ -355,31 +434,52 @@ def test_a_slow_filter_that_fails_is_left_out(variant53):
 
 
 def test_holm_s_test_of_four():
-    """Levels .05 / 4, .05 / 3, .05 / 2, .05: the third is too large, so the fourth is not rejected either."""
-    assert rejected(np.array([[0.001, 0.03], [0.016, 0.04]]), 0.05).tolist() == [[True, False], [True, False]]
+    """Levels .05 / 4, .05 / 3, .05 / 2, .05: the third is too large, so the fourth is not rejected
+    either."""
+    assert rejected(np.array([[0.001, 0.03], [0.016, 0.04]]), 0.05).tolist() == [
+        [True, False],
+        [True, False],
+    ]
     assert rejected(np.array([0.0125, 0.016, 0.024, 0.05]), 0.05).all()
 
 
 def test_the_ranking_does_not_keep_the_order_given(variant53):
-    squares = {name: np.array([d, d + 1]) for name, d in (("worst", 9.0), ("best", 1.0), ("middle", 4.0))}
-    assert [name for name, _ in by_hand(variant53, squares).ranking()] == ["best", "middle", "worst"]
+    squares = {
+        name: np.array([d, d + 1]) for name, d in (("worst", 9.0), ("best", 1.0), ("middle", 4.0))
+    }
+    assert [name for name, _ in by_hand(variant53, squares).ranking()] == [
+        "best",
+        "middle",
+        "worst",
+    ]
 
 
 def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
-    """Rounding made now one of two equal filters the least accurate, now the other, in table, ranking and conclusion."""
+    """Rounding made now one of two equal filters the least accurate, now the other, in table,
+    ranking and conclusion."""
     base = np.linspace(1, 2, 200)
     for first, second in ((1, 1 + 1e-15), (1 + 1e-15, 1)):
-        squares = {"best": base, "also": first * (base[::-1] + 9), "same": second * (base[::-1] + 9)}
+        squares = {
+            "best": base,
+            "also": first * (base[::-1] + 9),
+            "same": second * (base[::-1] + 9),
+        }
         result = by_hand(variant53, squares)
         assert [name for name, _ in result.ranking()] == ["best", "also", "same"]
-        assert [(one.best, one.worst) for one in result.verdicts()] == [("best", "same")] * result.steps
+        assert [(one.best, one.worst) for one in result.verdicts()] == [
+            ("best", "same")
+        ] * result.steps
         assert result.leaders(0) == ["best"]
-        assert by_hand(variant53, {name: squares[name] for name in ("also", "same")}).leaders(0) == ["also", "same"]
+        assert by_hand(variant53, {name: squares[name] for name in ("also", "same")}).leaders(
+            0
+        ) == ["also", "same"]
 
 
 def test_where_all_errors_are_zero_filters_are_equal(variant53):
     known = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0})
-    result = compare([aof(gaussian(known)), aof(linearised(known))], known, 200, 3, seed=1, progress=False)
+    result = compare(
+        [aof(gaussian(known)), aof(linearised(known))], known, 200, 3, seed=1, progress=False
+    )
     assert not result.error_variance("aof-linearised").value.any()
     assert result.without_error.all() and not result.usable.any()
     assert np.isnan(result.relative("aof-linearised").value).all()  # of nothing, nothing is a part
@@ -390,7 +490,15 @@ def test_where_all_errors_are_zero_filters_are_equal(variant53):
 # ---------------------------------------------------------------- the table of the page
 
 PAGE_RUNS = 1_000_000
-COLUMNS = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
+COLUMNS = (
+    "aof-gaussian",
+    "aof-linearised",
+    "duof",
+    "fos-gaussian",
+    "fos-linearised",
+    "mfos-gaussian",
+    "mfos-linearised",
+)
 PAGE = {  # D_k x 10^4, last digit
     1: ((6.506, 6.572, 6.478, 6.507, 6.486, 6.435, 6.424), 0.001),
     2: ((4.238, 4.240, 4.466, 4.333, 4.321, 4.298, 4.293), 0.001),
@@ -403,7 +511,11 @@ PAGE = {  # D_k x 10^4, last digit
 @pytest.fixture(scope="module")
 def lab_filters(variant53):
     structures = gaussian(variant53), linearised(variant53)
-    return [*(aof(one) for one in structures), duof(variant53), *(family(one) for family in (fos, mfos) for one in structures)]
+    return [
+        *(aof(one) for one in structures),
+        duof(variant53),
+        *(family(one) for family in (fos, mfos) for one in structures),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -415,7 +527,8 @@ def lab(lab_filters, variant53):
 @pytest.mark.parametrize("name", COLUMNS)
 def test_the_table_of_the_page_is_reproduced(lab, name, k):
     printed, digit = PAGE[k]
-    # Two independent ensembles: ours, and the page's of 10^6, whose error is ours times the root of the sizes' ratio.
+    # Two independent ensembles: ours, and the page's of 10^6, whose error is ours times the root of
+    # the sizes' ratio.
     both = np.sqrt(1 + lab.runs / PAGE_RUNS)
     reference = printed[COLUMNS.index(name)] * 1e-4
     found = lab.error_variance(name)[k]
@@ -427,10 +540,19 @@ REPEATS = 8
 
 @pytest.fixture(scope="module")
 def repeated(lab_filters, variant53):
-    """Ratios to the Gaussian AOF, (repeats, filters, steps), in independent runs that together are as large as the page's."""
+    """Ratios to the Gaussian AOF, (repeats, filters, steps), in independent runs that together are
+    as large as the page's."""
     ratios = []
     for seed in range(REPEATS):
-        result = compare(lab_filters, variant53, PAGE_RUNS // REPEATS, 11, seed, same_ensemble=True, progress=False)
+        result = compare(
+            lab_filters,
+            variant53,
+            PAGE_RUNS // REPEATS,
+            11,
+            seed,
+            same_ensemble=True,
+            progress=False,
+        )
         ratios.append([result.relative(name, "aof-gaussian").value for name in COLUMNS])
     return np.array(ratios)
 
@@ -439,13 +561,15 @@ def repeated(lab_filters, variant53):
 def test_the_ratios_to_the_gaussian_aof_are_the_page_s(repeated, k):
     """Ratios on common trajectories are known far better than the variances themselves.
 
-    Their error is taken from the scatter of independent runs, each with a design of its own: a standard error from
-    one run holds for the filter as designed there, and does not know how much its coefficients would vary.
+    Their error is taken from the scatter of independent runs, each with a design of its own: a
+    standard error from one run holds for the filter as designed there, and does not know how much
+    its coefficients would vary.
     """
     printed, digit = PAGE[k]
     printed = np.array(printed)
     ratios = repeated[:, :, k]
-    # Our mean and the page's run have the same size, so the same error; Student's quantile of 4 sigma for 8 runs.
+    # Our mean and the page's run have the same size, so the same error; Student's quantile of 4
+    # sigma for 8 runs.
     error = np.sqrt(2) * ratios.std(axis=0, ddof=1) / np.sqrt(REPEATS)
     quantile = stats.t.isf(stats.norm.sf(SIGMA), REPEATS - 1)
     rounding = 0.5 * digit / printed[0] * (1 + printed / printed[0])
@@ -456,7 +580,10 @@ def test_at_the_start_all_filters_are_near_the_page_s_value(lab):
     for name in COLUMNS:
         found = lab.error_variance(name)[0]
         # "all near 11.92": filters of one step differ by less than a per cent
-        assert abs(found.value - 11.92e-4) < SIGMA * np.sqrt(1.2) * found.standard_error + 0.01 * 11.92e-4
+        assert (
+            abs(found.value - 11.92e-4)
+            < SIGMA * np.sqrt(1.2) * found.standard_error + 0.01 * 11.92e-4
+        )
 
 
 @pytest.mark.parametrize("name", sorted(set(COLUMNS) - {"duof"}))
@@ -478,25 +605,37 @@ def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):
     assert asked.endswith(".smoothing") and not repr(found.smoothing).endswith(".smoothing")
     without = replace(found, left_out={"aof-exact": "too slow"})
     assert str(without).splitlines()[1] == "left out: aof-exact, too slow"
-    assert str(replace(without, runs=10_000, seed=10_000)).splitlines()[0].endswith("10,000 trajectories, seed 10000")
+    assert (
+        str(replace(without, runs=10_000, seed=10_000))
+        .splitlines()[0]
+        .endswith("10,000 trajectories, seed 10000")
+    )
 
 
 def test_without_a_standard_error_nothing_is_significant():
     nan = np.full(3, np.nan)
     assert np.isnan(Estimate(np.array([np.nan, 1.0, 0.0]), nan, 5).p_value()).all()
-    np.testing.assert_array_equal(Estimate(np.array([1.0, 0.0]), np.zeros(2), 5).p_value(), [0.0, 1.0])
+    np.testing.assert_array_equal(
+        Estimate(np.array([1.0, 0.0]), np.zeros(2), 5).p_value(), [0.0, 1.0]
+    )
     model = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
-    alone = compare([aof(gaussian(model)), aof(linearised(model))], model, 1, 3, seed=1, progress=False)
+    alone = compare(
+        [aof(gaussian(model)), aof(linearised(model))], model, 1, 3, seed=1, progress=False
+    )
     assert not any(verdict.worst for verdict in alone.verdicts())
 
 
 def test_means_over_no_steps():
     model = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
-    result = compare([aof(gaussian(model)), aof(linearised(model))], model, 256, 4, seed=1, progress=False)
+    result = compare(
+        [aof(gaussian(model)), aof(linearised(model))], model, 256, 4, seed=1, progress=False
+    )
     for ask in (result.ranking, lambda steps: result.score("aof-linearised", steps)):
         with pytest.raises(ValueError, match="none of the 4 steps"):
             ask(slice(4, None))
     object.__setattr__(result, "doubtful", np.array([True, True, False, False]))
     assert np.isnan(result.mean_gap("aof-linearised", slice(2)).value)
     assert np.isnan(result.mean_gap("aof-linearised", slice(2)).standard_error)
-    assert result.mean_gap("aof-linearised", slice(3)).value == result.gap("aof-linearised").value[2]
+    assert (
+        result.mean_gap("aof-linearised", slice(3)).value == result.gap("aof-linearised").value[2]
+    )

@@ -1,4 +1,5 @@
-"""The Monte Carlo engine: trajectories follow the model, and nothing but the seed decides the numbers."""
+"""The Monte Carlo engine: trajectories follow the model, and nothing but the seed decides the
+numbers."""
 
 import tracemalloc
 
@@ -24,7 +25,11 @@ SIGMA = 4  # standard errors: one chance in 16 000 a comparison
 
 def lab_of(model):
     structures = [gaussian(model), linearised(model)]
-    return [*(aof(one) for one in structures), duof(model), *(family(one) for family in (fos, mfos) for one in structures)]
+    return [
+        *(aof(one) for one in structures),
+        duof(model),
+        *(family(one) for family in (fos, mfos) for one in structures),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +52,12 @@ def test_trajectories_satisfy_the_equations(vector):
     v1 = (x[1:, :, 0] - 0.9 * x[:-1, :, 0] - 0.2 * x[:-1, :, 1]) / 0.3
     difference = x[1:, :, 1] - 0.8 * x[:-1, :, 1]
     w = np.stack([y[..., 0] - x[..., 0], (y[..., 1] - x[..., 1] + x[..., 0]) / 0.5])
-    for sample, mean, variance in ((v1, 1, 2), (difference, 1, 1 + 3 - 2 * 0.5), (w[0], 0.5, 1), (w[1], 0.5, 2)):
+    for sample, mean, variance in (
+        (v1, 1, 2),
+        (difference, 1, 1 + 3 - 2 * 0.5),
+        (w[0], 0.5, 1),
+        (w[1], 0.5, 2),
+    ):
         n = sample.size
         assert abs(sample.mean() - mean) < SIGMA * np.sqrt(variance / n)
         assert abs(sample.var() - variance) < SIGMA * variance * np.sqrt(2 / n)
@@ -55,7 +65,12 @@ def test_trajectories_satisfy_the_equations(vector):
         found = np.mean((left - left.mean()) * (right - right.mean()))
         assert abs(found - cov) < SIGMA * np.sqrt((product + cov**2) / left.size)
     # independent of one another and in time
-    for left, right in ((v1, w[0][:-1]), (v1[1:], v1[:-1]), (w[1][1:], w[1][:-1]), (v1, x[:-1, :, 0])):
+    for left, right in (
+        (v1, w[0][:-1]),
+        (v1[1:], v1[:-1]),
+        (w[1][1:], w[1][:-1]),
+        (v1, x[:-1, :, 0]),
+    ):
         assert abs(np.corrcoef(left.ravel(), right.ravel())[0, 1]) < SIGMA / np.sqrt(left.size)
 
 
@@ -63,19 +78,27 @@ def test_the_prior_is_drawn_as_given(vector):
     x, n = simulate(vector, 20_000, 1, seed=5).x[0], 20_000
     np.testing.assert_allclose(x.mean(axis=0), [1, -2], rtol=0, atol=SIGMA * np.sqrt(2 / n))
     found, cov = np.cov(x.T), vector.prior.cov
-    error = np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / n)  # Var of a sample covariance of Gaussians
+    # Var of a sample covariance of Gaussians
+    error = np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / n)
     assert (abs(found - cov) < SIGMA * error).all()
 
 
 def test_variant_53_decays_as_the_page_says(variant53):
-    # Var x_k = (c^2 + e^2)^k; x is heavy-tailed, so the standard error is taken from the sample itself.
+    # Var x_k = (c^2 + e^2)^k; x is heavy-tailed, so the standard error is taken from the sample
+    # itself.
     squares = simulate(variant53, 20_000, 12, seed=2).x[..., 0] ** 2
     expected = (0.9**2 + 0.05**2) ** np.arange(12)
-    assert (abs(squares.mean(axis=1) - expected) < SIGMA * squares.std(axis=1) / np.sqrt(20_000)).all()
+    assert (
+        abs(squares.mean(axis=1) - expected) < SIGMA * squares.std(axis=1) / np.sqrt(20_000)
+    ).all()
 
 
 def test_the_seed_decides_the_trajectories(variant53):
-    first, again, other = simulate(variant53, 50, 7, 1), simulate(variant53, 50, 7, 1), simulate(variant53, 50, 7, 2)
+    first, again, other = (
+        simulate(variant53, 50, 7, 1),
+        simulate(variant53, 50, 7, 1),
+        simulate(variant53, 50, 7, 2),
+    )
     np.testing.assert_array_equal(first.y, again.y)
     assert not np.isin(first.x[0], other.x[0]).any()
 
@@ -101,7 +124,9 @@ def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(kind, request):
         for i in (0, 29):
             alone = run(aof(build(model)), y[:, i : i + 1])
             # the library's matrix products may add in another order: a few roundings a step
-            np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, i], rtol=1e-12, atol=1e-14)
+            np.testing.assert_allclose(
+                alone.mean[:, 0], together.mean[:, i], rtol=1e-12, atol=1e-14
+            )
             np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, i], rtol=1e-12, atol=1e-14)
 
 
@@ -109,7 +134,9 @@ def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(kind, request):
 def test_measurements_of_another_size_are_refused(kind, request):
     model = request.getfixturevalue(kind)
     for build in (lambda m: aof(linearised(m)), lambda m: aof(gaussian(m))):
-        with pytest.raises(ValueError, match=rf"expects {model.p} measurement component\(s\), got 3"):
+        with pytest.raises(
+            ValueError, match=rf"expects {model.p} measurement component\(s\), got 3"
+        ):
             run(build(model), np.zeros((4, 5, 3)))
 
 
@@ -117,20 +144,31 @@ def test_measurements_of_another_size_are_refused(kind, request):
 
 
 def numbers(comparison):
-    return [getattr(comparison.sums, name) for name in ("weight", "error", "square", "own", "normalised")]
+    return [
+        getattr(comparison.sums, name)
+        for name in ("weight", "error", "square", "own", "normalised")
+    ]
 
 
 @pytest.mark.parametrize("runs", [37, 2345])
 def test_the_number_of_jobs_changes_nothing(variant53, runs):
-    results = [compare(lab_of(variant53), variant53, runs, 6, seed=7, jobs=jobs, progress=False) for jobs in (1, 2, 3)]
+    results = [
+        compare(lab_of(variant53), variant53, runs, 6, seed=7, jobs=jobs, progress=False)
+        for jobs in (1, 2, 3)
+    ]
     for other in results[1:]:
         for first, second in zip(numbers(results[0]), numbers(other), strict=True):
             np.testing.assert_array_equal(first, second)
 
 
 def test_the_seed_changes_everything(variant53):
-    first, second = (compare([aof(gaussian(variant53))], variant53, 100, 3, seed=seed, progress=False) for seed in (1, 2))
-    assert (first.error_variance("aof-gaussian").value != second.error_variance("aof-gaussian").value).all()
+    first, second = (
+        compare([aof(gaussian(variant53))], variant53, 100, 3, seed=seed, progress=False)
+        for seed in (1, 2)
+    )
+    assert (
+        first.error_variance("aof-gaussian").value != second.error_variance("aof-gaussian").value
+    ).all()
 
 
 def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
@@ -138,7 +176,9 @@ def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
     together = compare(filters, variant53, 500, 4, seed=7, progress=False)
     for filter_ in (filters[0], filters[2], filters[5]):
         alone = compare([filter_], variant53, 500, 4, seed=7, progress=False)
-        np.testing.assert_array_equal(alone.error_variance(filter_.name).value, together.error_variance(filter_.name).value)
+        np.testing.assert_array_equal(
+            alone.error_variance(filter_.name).value, together.error_variance(filter_.name).value
+        )
 
 
 @pytest.mark.parametrize(("runs", "steps"), [(1, 1), (2, 1), (1, 5), (3, 4), (127, 3), (129, 2)])
@@ -152,11 +192,13 @@ def test_small_experiments_run(vector, runs, steps):
 
 
 def test_the_design_ensemble_is_another_one(variant53):
-    """On the design's own trajectories MFOS looks better than on fresh ones, and never worse than it would by chance."""
+    """On the design's own trajectories MFOS looks better than on fresh ones, and never worse than
+    it would by chance."""
     filters = [aof(gaussian(variant53)), mfos(gaussian(variant53))]
     same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True, progress=False)
     fresh = compare(filters, variant53, 60, 1, seed=11, design_runs=20, progress=False)
-    # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other coefficients can be below.
+    # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other
+    # coefficients can be below.
     own, others = (result.gap("mfos-gaussian").value[0] for result in (same, fresh))
     assert own <= 0 < others
 
@@ -172,7 +214,8 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
         return found
 
     peak(4)  # what is compiled and cached once
-    # The sums: 2 filters x 60 more steps x 6 statistics x 64 batches x 8 bytes = 0.4 MB; trajectories would be 20 MB.
+    # The sums: 2 filters x 60 more steps x 6 statistics x 64 batches x 8 bytes = 0.4 MB;
+    # trajectories would be 20 MB.
     assert peak(80) - peak(20) < 1.5e6
 
 
@@ -198,10 +241,23 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
     ],
 )
 def test_bad_arguments_are_value_errors_that_name_them(variant53, arguments, message):
-    one, other = aof(gaussian(variant53)), Model.define(["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"])
+    one, other = (
+        aof(gaussian(variant53)),
+        Model.define(["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"]),
+    )
     filters = {"twice": [one, one], "other model": [one, duof(other)]}
-    call = {"filters": [one, duof(variant53)], "model": variant53, "runs": 10, "steps": 2, "seed": 1} | arguments
-    call["filters"] = filters.get(call["filters"], call["filters"]) if isinstance(call["filters"], str) else call["filters"]
+    call = {
+        "filters": [one, duof(variant53)],
+        "model": variant53,
+        "runs": 10,
+        "steps": 2,
+        "seed": 1,
+    } | arguments
+    call["filters"] = (
+        filters.get(call["filters"], call["filters"])
+        if isinstance(call["filters"], str)
+        else call["filters"]
+    )
     with pytest.raises(ValueError, match=message):
         compare(progress=False, **call)
 
@@ -210,7 +266,9 @@ def test_bad_arguments_are_value_errors_that_name_them(variant53, arguments, mes
 @pytest.mark.filterwarnings("error")
 def test_a_diverging_model_says_so(filters):
     model = Model.define("x**3*2 + v", "x + w")
-    chosen = {"ready": [aof(linearised(model)), aof(gaussian(model))], "designed": [duof(model)]}[filters]
+    chosen = {"ready": [aof(linearised(model)), aof(gaussian(model))], "designed": [duof(model)]}[
+        filters
+    ]
     with pytest.raises(NotFinite, match=r"(become infinite|diverges)"):
         compare(chosen, model, 200, 12, seed=1, progress=False)
 
@@ -220,8 +278,15 @@ def test_a_diverging_filter_is_named():
     # Stable object, exact meter of sharp curvature: the trajectories stay finite.
     model = Model.define("0.5*x + 0.1*v", "x + 0.1*w")
     good = kalman_filter(model)
-    bad = type(good)("bad", model, good.init, lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)))
-    with pytest.raises(NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"):
+    bad = type(good)(
+        "bad",
+        model,
+        good.init,
+        lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)),
+    )
+    with pytest.raises(
+        NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"
+    ):
         compare([good, bad], model, 50, 4, seed=1, progress=False)
 
 
@@ -240,7 +305,11 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
     for filter_, measurements, message in (
         (one, np.zeros((5, 1)), both),
         (one, np.zeros((5, 4)), r"\(5, 4\): give y\[:, :, None\] if they are trajectories$"),
-        (pair, np.zeros((5, 2)), r"give y\[:, None, :\] if the columns are components of one trajectory$"),
+        (
+            pair,
+            np.zeros((5, 2)),
+            r"give y\[:, None, :\] if the columns are components of one trajectory$",
+        ),
         (pair, np.zeros(5), r"must have the shape \(steps, runs, 2\), got \(5,\)$"),
         (pair, np.zeros((5, 3)), r"got \(5, 3\)$"),
         (one, np.zeros((5, 1, 2)), "expects 1 measurement component"),
@@ -257,17 +326,22 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
 
 def test_a_design_that_is_run_says_what_to_do(variant53):
     y = simulate(variant53, 2, 3, seed=1).y
-    with pytest.raises(TypeError, match=r"got Design duof: .*design\(\.\.\.\) makes one of a design"):
+    with pytest.raises(
+        TypeError, match=r"got Design duof: .*design\(\.\.\.\) makes one of a design"
+    ):
         run(duof(variant53), y)
     one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
     assert np.isfinite(run(one, y).mean).all()
 
 
 def test_each_batch_of_a_comparison_has_particles_of_its_own(vector):
-    """Errors of particles that were the same in all batches would not average out, and no interval would know."""
+    """Errors of particles that were the same in all batches would not average out, and no interval
+    would know."""
     seeds, cloud = np.random.SeedSequence(1).spawn(2), particle(vector, particles=20)
     sample = Sample(vector, 1, [50, 50], seeds)
     starts = [sample.part(slice(b, b + 1)).begun(cloud) for b in (0, 1, 0)]
-    first, second, again = (cloud.step(state, np.zeros((50, vector.p))).posterior.mean for state in starts)
+    first, second, again = (
+        cloud.step(state, np.zeros((50, vector.p))).posterior.mean for state in starts
+    )
     np.testing.assert_array_equal(first, again)
     assert (first != second).all()

@@ -1,4 +1,5 @@
-"""Notebooks executed in this process: no kernel has to start, where nothing is asked about kernels."""
+"""Notebooks executed in this process: no kernel has to start, where nothing is asked about
+kernels."""
 
 import ast
 import json
@@ -23,9 +24,15 @@ def execute_inside(notebook, name="", seconds=0.0):
             exec(compile(ast.Module(body, []), cell.id, "exec"), namespace)
             value = last and eval(compile(ast.Expression(last.value), cell.id, "eval"), namespace)
             if hasattr(value, "_repr_mimebundle_"):
-                cell.outputs = [nbformat.v4.new_output("execute_result", value._repr_mimebundle_(), execution_count=count)]
+                cell.outputs = [
+                    nbformat.v4.new_output(
+                        "execute_result", value._repr_mimebundle_(), execution_count=count
+                    )
+                ]
         except Exception as error:
-            cell.outputs = [nbformat.v4.new_output("error", ename=type(error).__name__, evalue=str(error))]
+            cell.outputs = [
+                nbformat.v4.new_output("error", ename=type(error).__name__, evalue=str(error))
+            ]
     return result
 
 
@@ -50,11 +57,20 @@ class InsideKernel:
         except Exception as raised:
             error, stub = f"{type(raised).__name__}: {raised}", _of_a_stub(raised)
         self._answers |= handed_in
-        return Ran(error, stub, {name: "" if callable(value) else type(value).__name__ for name, value in handed_in.items()})
+        return Ran(
+            error,
+            stub,
+            {
+                name: "" if callable(value) else type(value).__name__
+                for name, value in handed_in.items()
+            },
+        )
 
     def ask(self, question, arguments, seconds):
         functions = []
-        sent = _sent(encode(arguments, lambda function: functions.append(function) or len(functions) - 1))
+        sent = _sent(
+            encode(arguments, lambda function: functions.append(function) or len(functions) - 1)
+        )
         return decode(_sent(encode(self._answers[question](*decode(sent, functions.__getitem__)))))
 
 

@@ -1,4 +1,5 @@
-"""Exercises about variants with time and inputs: solutions pass, untouched notebooks do not, a wrong step is never right."""
+"""Exercises about variants with time and inputs: solutions pass, untouched notebooks do not, a
+wrong step is never right."""
 
 import re
 from functools import cache
@@ -29,7 +30,9 @@ TABLES = {
         "parameters": {"c": 0.6, "r": 0.05, "e": 0.3, "q": 0.5, "g": 1.0, "h": 0.2, "f": 0.4},
     },
 }
-SETS = [(name, letter) for name in TABLES for letter in "abcdefg" if (name, letter) != ("growth", "a")]
+SETS = [
+    (name, letter) for name in TABLES for letter in "abcdefg" if (name, letter) != ("growth", "a")
+]
 
 
 @cache
@@ -43,7 +46,8 @@ def rendered(name, letter):
 
 
 def run(notebook, *change):
-    """The functions that a notebook defines, after a change of its text; all up to its last check, without the checks."""
+    """The functions that a notebook defines, after a change of its text; all up to its last check,
+    without the checks."""
     cells = [one for one in notebook.cells if one.cell_type == "code"]
     last = max(place for place, one in enumerate(cells) if "check" in one.metadata.get("tags", []))
     namespace, changed = {}, 0
@@ -59,7 +63,10 @@ def run(notebook, *change):
 @pytest.mark.parametrize(("name", "letter"), SETS)
 def test_solutions_pass_and_untouched_notebooks_do_not(name, letter):
     lab = opened(name, letter)
-    solved, untouched = run(solution(rendered(name, letter))), run(student(rendered(name, letter), {}))
+    solved, untouched = (
+        run(solution(rendered(name, letter))),
+        run(student(rendered(name, letter), {})),
+    )
     for question in sets()[letter].questions:
         assert lab.check(question.name, solved[question.function]).passed
         assert lab.check(question.name, untouched[question.function]).status == "not implemented"
@@ -87,7 +94,8 @@ WRONG_STEPS = {
 @pytest.mark.parametrize("name", TABLES)
 @pytest.mark.parametrize("question", WRONG_STEPS)
 def test_a_wrong_step_is_named(name, question):
-    """Also where the input rests at first, and where the switch comes after the steps that are simulated."""
+    """Also where the input rests at first, and where the switch comes after the steps that are
+    simulated."""
     lab = opened(name, question[0])
     for old, new, mistake in WRONG_STEPS[question]:
         functions = run(solution(rendered(name, question[0])), old, new)
@@ -131,17 +139,24 @@ TYPED = [
 
 @pytest.mark.parametrize(("name", "answer", "mistake"), TYPED)
 def test_formulas_with_time_and_inputs(name, answer, mistake):
-    """A switch is looked at on both sides, step by step; `mistake` is "" for a right answer, None for one without a name."""
+    """A switch is looked at on both sides, step by step; `mistake` is "" for a right answer, None
+    for one without a name."""
     result = opened(name, "a").check("a2", answer)
     assert result.passed == (mistake == "")
     assert not mistake or mistake in result.diagnosis, result
 
 
 def test_what_cannot_be_asked_is_refused_with_the_reason():
-    with pytest.raises(ExerciseError, match=r"set a asks for formulas.*no closed form.*another variant for this set"):
+    with pytest.raises(
+        ExerciseError,
+        match=r"set a asks for formulas.*no closed form.*another variant for this set",
+    ):
         rendered("growth", "a")
     for letter in "bcdg":
-        with pytest.raises(ExerciseError, match=f"set {letter} asks about a model without angles in the measurement"):
+        with pytest.raises(
+            ExerciseError,
+            match=f"set {letter} asks about a model without angles in the measurement",
+        ):
             exercise(letter, ANGLE)
     with pytest.raises(ExerciseError, match="set e asks about a model without angles in the state"):
         exercise("e", ANGLE | {"angles": {"x": ["x"], "y": ["y"]}})

@@ -1,4 +1,5 @@
-"""Grading returned notebooks: only what the student wrote counts, and no notebook disturbs another."""
+"""Grading returned notebooks: only what the student wrote counts, and no notebook disturbs
+another."""
 
 import csv
 import io
@@ -32,7 +33,10 @@ FIXTURES = Path(__file__).parent / "fixtures"
 TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
 SECONDS = 15  # of a cell; the endless loop below takes so long
 SETTING = marking.Setting(Site(Path("stage"), Sandbox("none")), "salt")
-MARKS = {f"b{i}": mark for i, mark in enumerate(("passed", "wrong", "unusable", "not implemented", "not run"), 1)}
+MARKS = {
+    f"b{i}": mark
+    for i, mark in enumerate(("passed", "wrong", "unusable", "not implemented", "not run"), 1)
+}
 NEW = ("not implemented", "not implemented")
 
 
@@ -72,7 +76,12 @@ def add(notebook, source, before=None):
 
 def wrong():
     notebook = change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross")
-    return change(notebook, "def correct", "K = gain(Psi, G, F)", "K = -np.swapaxes(np.linalg.solve(F, G @ Psi), -1, -2)")
+    return change(
+        notebook,
+        "def correct",
+        "K = gain(Psi, G, F)",
+        "K = -np.swapaxes(np.linalg.solve(F, G @ Psi), -1, -2)",
+    )
 
 
 def fakes_checks():
@@ -80,15 +89,24 @@ def fakes_checks():
     notebook = wrong()
     for name in ("b1", "b2"):
         one = cell(notebook, f'task.check("{name}"')
-        data = {MIME: {"question": name, "status": "passed", "diagnosis": [], "message": "right"}, "text/plain": "✓"}
-        one.source, one.outputs = "print('✓ right')", [nbformat.v4.new_output("execute_result", data, execution_count=1)]
+        data = {
+            MIME: {"question": name, "status": "passed", "diagnosis": [], "message": "right"},
+            "text/plain": "✓",
+        }
+        one.source, one.outputs = (
+            "print('✓ right')",
+            [nbformat.v4.new_output("execute_result", data, execution_count=1)],
+        )
     return notebook
 
 
 def shows_results():
     """The answer itself shows a result that says passed."""
     passed = {"question": "b1", "status": "passed", "diagnosis": [], "message": "right"}
-    lie = f"from IPython.display import display\n    display({{{MIME!r}: {passed}}}, raw=True)\n    cross = G @ Psi"
+    lie = (
+        f"from IPython.display import display\n    display({{{MIME!r}: {passed}}}, raw=True)\n  "
+        f"  cross = G @ Psi"
+    )
     return change(wrong(), "def gain", "cross = G @ Psi", lie)
 
 
@@ -101,12 +119,15 @@ def patches():
 
 
 def deletes():
-    """No ids, no metadata, no checks, no opening cell; the answer in two cells; another name of the file."""
+    """No ids, no metadata, no checks, no opening cell; the answer in two cells; another name of the
+    file."""
     notebook = change(solved(), "def gain", "    cross = G @ Psi\n", "")
     change(notebook, "def gain", "solve(F, cross)", "solve(F, product(G, Psi))")
     add(notebook, "def product(A, B):\n    return A @ B", "def gain")
     notebook.cells = [
-        cell for cell in notebook.cells if cell.cell_type == "code" and not cell.source.startswith(("task.check", "import"))
+        cell
+        for cell in notebook.cells
+        if cell.cell_type == "code" and not cell.source.startswith(("task.check", "import"))
     ]
     for one in notebook.cells:
         one.metadata.clear()
@@ -123,10 +144,15 @@ def rewrites():
 def merges():
     """Both answers and both checks in the first answer's cell."""
     notebook = solved()
-    sources = [cell(notebook, start).source for start in ("def gain", "def correct", 'task.check("b1"', 'task.check("b2"')]
+    sources = [
+        cell(notebook, start).source
+        for start in ("def gain", "def correct", 'task.check("b1"', 'task.check("b2"')
+    ]
     cell(notebook, "def gain").source = "\n".join(sources)
     notebook.cells = [
-        one for one in notebook.cells if not one.source.startswith(("def correct", "task.check")) or one.cell_type != "code"
+        one
+        for one in notebook.cells
+        if not one.source.startswith(("def correct", "task.check")) or one.cell_type != "code"
     ]
     return notebook
 
@@ -137,12 +163,22 @@ def opens_another():
 
 def imports():
     """The opening cell is changed, and what it adds is needed."""
-    notebook = change(solved(), "import matplotlib", "import numpy as np", "import numpy as np\nfrom numpy.linalg import solve")
+    notebook = change(
+        solved(),
+        "import matplotlib",
+        "import numpy as np",
+        "import numpy as np\nfrom numpy.linalg import solve",
+    )
     return change(notebook, "def gain", "np.linalg.solve", "solve")
 
 
 def takes_the_answer():
-    return change(solved(), "def gain", "    cross = G @ Psi", "    return task.questions['b1'].answer(task)(Psi, G, F)")
+    return change(
+        solved(),
+        "def gain",
+        "    cross = G @ Psi",
+        "    return task.questions['b1'].answer(task)(Psi, G, F)",
+    )
 
 
 def syntax():
@@ -150,20 +186,31 @@ def syntax():
 
 
 def loops():
-    return add(solved(), "import time\nwhile True:\n    time.sleep(1)", "def correct")  # idle: the processors are for others
+    # idle: the processors are for others
+    return add(solved(), "import time\nwhile True:\n    time.sleep(1)", "def correct")
 
 
 def leaves(flag):
     """Ends its kernel, and leaves a process behind."""
-    source = f"import os, subprocess\nopen({str(flag)!r}, 'w').write(str(subprocess.Popen(['sleep', '600']).pid))\nos._exit(1)"
+    source = (
+        f"import os, subprocess\nopen({str(flag)!r}, "
+        f"'w').write(str(subprocess.Popen(['sleep', '600']).pid))\nos._exit(1)"
+    )
     return add(solved(), source, "def correct")
 
 
 def shows():
-    """Lines that only concern the display, of another system, above the imports; a changed cell that stops below them."""
-    lines = "%matplotlib widget\n%config InlineBackend.figure_format = 'retina'\n%load_ext nothing\n"
-    notebook = change(solved(), "import matplotlib", "import matplotlib", lines + "import matplotlib")
-    return change(notebook, lines[:10], "import numpy", "plt.style.use('no such style')\nimport numpy")
+    """Lines that only concern the display, of another system, above the imports; a changed cell
+    that stops below them."""
+    lines = (
+        "%matplotlib widget\n%config InlineBackend.figure_format = 'retina'\n%load_ext nothing\n"
+    )
+    notebook = change(
+        solved(), "import matplotlib", "import matplotlib", lines + "import matplotlib"
+    )
+    return change(
+        notebook, lines[:10], "import numpy", "plt.style.use('no such style')\nimport numpy"
+    )
 
 
 def floods():
@@ -172,13 +219,18 @@ def floods():
 
 def careless():
     """Asks for too much memory, and leaves where a kernel goes on."""
-    return add(add(solved(), "import sys\nsys.exit(1)", "def gain"), "block = np.ones(10**9)", "def correct")
+    return add(
+        add(solved(), "import sys\nsys.exit(1)", "def gain"),
+        "block = np.ones(10**9)",
+        "def correct",
+    )
 
 
 def litters():
     source = (
         "import os, pathlib\n"
-        "assert list(pathlib.Path.home().glob('litter')) == list(pathlib.Path().glob('litter')) == []\n"
+        "assert list(pathlib.Path.home().glob('litter')) == list(pathlib.Path().glob('litter')) "
+        "== []\n"
         "pathlib.Path('litter').write_text('x')\n"
         "assert 'KFCOURSE_SECRET' not in os.environ\n"
         "answer = input()"
@@ -222,7 +274,8 @@ def fill(folder):
     for name, notebook in notebooks.items():
         path = folder / f"{name}.ipynb"
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
+        # as it is: nbformat would mend some of them
+        path.write_text(json.dumps(notebook), encoding="utf-8")
     (folder / "cut.ipynb").write_text(json.dumps(solved())[:500], encoding="utf-8")
     (folder / "list.ipynb").write_text("[1, 2]", encoding="utf-8")
 
@@ -245,16 +298,34 @@ def graded(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KFCOURSE_SECRET", "x")
         listed = folder.parent / "list.csv"
-        listed.write_text("name,group,variant\nИванов Иван,М-1,53\nПетров,М-1,53\nСидоров,М-1,7\n", encoding="utf-8")
-        options = ["--masters", str(FIXTURES), "--seconds", str(SECONDS), "--sandbox", "none", "--students", str(listed)]
+        listed.write_text(
+            "name,group,variant\nИванов Иван,М-1,53\nПетров,М-1,53\nСидоров,М-1,7\n",
+            encoding="utf-8",
+        )
+        options = [
+            "--masters",
+            str(FIXTURES),
+            "--seconds",
+            str(SECONDS),
+            "--sandbox",
+            "none",
+            "--students",
+            str(listed),
+        ]
         result = CliRunner().invoke(cli.main, ["grade", str(folder), *options])
     assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    rows = {name.removesuffix(".ipynb"): row for name, row in table(folder.parent / "returned-grades.csv").items()}
+    rows = {
+        name.removesuffix(".ipynb"): row
+        for name, row in table(folder.parent / "returned-grades.csv").items()
+    }
     return Graded(result.exit_code, result.output, rows, folder)
 
 
 def table(path):
-    return {row["notebook"]: row for row in csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig")))}
+    return {
+        row["notebook"]: row
+        for row in csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig")))
+    }
 
 
 def row(graded, name):
@@ -264,14 +335,19 @@ def row(graded, name):
 
 @pytest.fixture
 def graded_here(tmp_path):
-    """Grades a notebook that does nothing to its process in this one: its grade, two marks and note."""
+    """Grades a notebook that does nothing to its process in this one: its grade, two marks and
+    note."""
 
     def graded(notebook, given="", variants_file=None, whole=True, masters=FIXTURES):
         path = tmp_path / "x.ipynb"
-        path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
+        # as it is: nbformat would mend some of them
+        path.write_text(json.dumps(notebook), encoding="utf-8")
         if variants_file:
             (tmp_path / "my.toml").write_text(variants_file, encoding="utf-8")
-        options = {"variants_file": tmp_path / "my.toml" if variants_file else None, "given": lambda *_: given}
+        options = {
+            "variants_file": tmp_path / "my.toml" if variants_file else None,
+            "given": lambda *_: given,
+        }
         (work,) = submissions.returned(tmp_path, masters=masters, **options)
         found = marking.grade(work, SETTING, start=InsideKernel)
         assert found.status == "graded" or not whole, found.note
@@ -282,7 +358,10 @@ def graded_here(tmp_path):
 
 def test_every_notebook_has_a_row(graded):
     assert graded.exit_code == 1  # some could not be graded
-    names = {path.relative_to(graded.folder).with_suffix("").as_posix() for path in graded.folder.rglob("*.ipynb")}
+    names = {
+        path.relative_to(graded.folder).with_suffix("").as_posix()
+        for path in graded.folder.rglob("*.ipynb")
+    }
     assert set(graded.table) == names - {".ipynb_checkpoints/loops-checkpoint"}
     assert "17 run, 0 unchanged since the last table" in graded.output
 
@@ -304,7 +383,8 @@ def test_a_solution_passes(graded):
 def test_lines_for_the_display_stop_nothing(graded):
     marks, note = row(graded, "shows")
     assert marks == ("passed", "passed")
-    assert note.startswith("cell 2: OSError: 'no such style'")  # the master's own cell has run before it
+    # the master's own cell has run before it
+    assert note.startswith("cell 2: OSError: 'no such style'")
 
 
 @pytest.mark.quick
@@ -319,7 +399,9 @@ def changed(name, **fields):
     """A question of set b with other fields."""
     question = next(one for one in sets()["b"].questions if one.name == name)
     before = {field: getattr(question, field) for field in fields}
-    salted.cache_clear()  # its exercises keep what was posed, and a dict finds the same object again at one of eight places
+    # its exercises keep what was posed, and a dict finds the same object again at one of eight
+    # places
+    salted.cache_clear()
     try:
         for field, value in fields.items():
             object.__setattr__(question, field, value)
@@ -339,17 +421,28 @@ def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here):
     with changed("b1", arguments=broken):
         found, marks, note = graded_here(solved(), whole=False)
     assert marks == ("not graded", "passed")
-    assert (found.status, found.digest, found.comments["b1"].says) == ("graded in part", "", marking.LOOKED_AT)
-    assert note.startswith("look: b1 not graded: the check itself fails, please tell us: AttributeError: 'Mul' object")
+    assert (found.status, found.digest, found.comments["b1"].says) == (
+        "graded in part",
+        "",
+        marking.LOOKED_AT,
+    )
+    assert note.startswith(
+        "look: b1 not graded: the check itself fails, please tell us: AttributeError: 'Mul' object"
+    )
 
 
 def test_a_step_on_a_wrong_one_and_right_parts_are_said(graded_here):
-    """The second stands on the student's own wrong gain; in the other notebook one of its two results is right."""
-    found, marks, note = graded_here(change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross"))
+    """The second stands on the student's own wrong gain; in the other notebook one of its two
+    results is right."""
+    found, marks, note = graded_here(
+        change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross")
+    )
     assert marks == ("wrong", "wrong")
     assert (found.comments["b2"].follows, found.comments["b2"].share) == (("b1",), 0.0)
     assert "b2: follows" in note and "right on top of your b1" in found.comments["b2"].says
-    found, marks, _ = graded_here(change(solved(), "def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi"))
+    found, marks, _ = graded_here(
+        change(solved(), "def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi")
+    )
     assert (marks, found.comments["b2"].share) == (("passed", "wrong"), 0.5)
 
 
@@ -382,11 +475,16 @@ def test_another_variant_is_noticed_and_does_not_count(graded_here):
 @pytest.mark.parametrize("line", ["task = Own()", "task.check = print", "task = exercise2"])
 def test_a_task_of_the_students_own_is_noticed(graded_here, line):
     stands_in = "class Own: ...\nOwn.check = print\nexercise2 = task\nif 0: "
-    assert graded_here(add(solved(), stands_in + line, "def gain"))[2] == f"look: cell 4: if 0: {line}"
+    assert (
+        graded_here(add(solved(), stands_in + line, "def gain"))[2] == f"look: cell 4: if 0: {line}"
+    )
 
 
 def test_taking_the_answer_is_noticed(graded_here):
-    assert "(gain): return task.questions['b1'].answer(task)(Psi, G, F)" in graded_here(takes_the_answer())[2]
+    assert (
+        "(gain): return task.questions['b1'].answer(task)(Psi, G, F)"
+        in graded_here(takes_the_answer())[2]
+    )
 
 
 def test_an_error_is_reported_by_cell(graded_here):
@@ -442,7 +540,10 @@ def test_a_variant_of_the_courses_own(graded_here):
     assert (found.variant, note) == ("mine", "")
     found, *_ = graded_here(solution(render(TINY, own)), whole=False)
     assert (found.status, found.marks) == ("not graded", {})
-    assert found.note.startswith("if variant mine is of a file of yours, name that with --variants; no variant 'mine'; there are")
+    assert found.note.startswith(
+        "if variant mine is of a file of yours, name that with --variants; no variant 'mine'; "
+        "there are"
+    )
 
 
 def test_what_cannot_be_graded_is_named(graded):
@@ -455,7 +556,8 @@ def test_what_cannot_be_graded_is_named(graded):
         "unknown-variant": "no variant",
     }.items():
         assert status[name][0] == "not graded" and words in status[name][1]
-    assert "\x1b" not in graded.output.replace("\x1b[31m\x1b[1m", "").replace("\x1b[0m", "")  # ours are red
+    # ours are red
+    assert "\x1b" not in graded.output.replace("\x1b[31m\x1b[1m", "").replace("\x1b[0m", "")
 
 
 def test_a_course_list_tells_what_to_look_at(graded):
@@ -475,7 +577,10 @@ def without_running(monkeypatch):
 
     def instead(works, *_):
         ran.extend(work.name for work in works)
-        return [Grade(work.name, "graded", "b", "53", MARKS, ("anew",), (), work.digest) for work in works]
+        return [
+            Grade(work.name, "graded", "b", "53", MARKS, ("anew",), (), work.digest)
+            for work in works
+        ]
 
     monkeypatch.setattr(pool, "graded", instead)
     return ran
@@ -484,14 +589,22 @@ def without_running(monkeypatch):
 def test_a_second_run_does_only_what_is_new(graded, tmp_path, without_running):
     shutil.copytree(graded.folder, tmp_path / "copy")
     for kind in ("csv", "jsonl"):
-        shutil.copy(graded.folder.parent / f"returned-grades.{kind}", tmp_path / f"copy-grades.{kind}")
+        shutil.copy(
+            graded.folder.parent / f"returned-grades.{kind}", tmp_path / f"copy-grades.{kind}"
+        )
     options = ["grade", str(tmp_path / "copy"), "--masters", str(FIXTURES), "--sandbox", "none"]
     options += ["--students", str(graded.folder.parent / "list.csv")]
     again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
     assert again.exit_code == 0
-    assert sorted(without_running) == ["cut.ipynb", "list.ipynb", "unknown-set.ipynb", "unknown-variant.ipynb"]
+    assert sorted(without_running) == [
+        "cut.ipynb",
+        "list.ipynb",
+        "unknown-set.ipynb",
+        "unknown-variant.ipynb",
+    ]
     assert "4 run, 13 unchanged" in again.output
-    assert "b1: gain-not-divided" in (tmp_path / "copy-grades.csv").read_text(encoding="utf-8")  # of shows-results
+    # of shows-results
+    assert "b1: gain-not-divided" in (tmp_path / "copy-grades.csv").read_text(encoding="utf-8")
 
     without_running.clear()
     (tmp_path / "copy" / "shows-results.ipynb").rename(tmp_path / "copy" / "renamed.ipynb")
@@ -500,7 +613,8 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, without_running):
     assert without_running == ["rewrites.ipynb"]
     assert {"renamed.ipynb", "rewrites.ipynb"} < set(table(tmp_path / "copy-grades.csv"))
 
-    for more in (["--seconds", str(SECONDS), "--again"], ["--seconds", "99"]):  # what was ended too early may come to its end
+    # what was ended too early may come to its end
+    for more in (["--seconds", str(SECONDS), "--again"], ["--seconds", "99"]):
         without_running.clear()
         CliRunner().invoke(cli.main, [*options, *more])
         assert len(without_running) == 17
@@ -522,12 +636,24 @@ def test_a_returned_table_of_grades_counts_for_nothing(three, without_running):
         assert result.exit_code == 1 and "is inside of what was returned" in result.output
 
 
-def test_without_a_sandbox_nothing_runs_unless_somebody_says_so(three, without_running, monkeypatch):
+def test_without_a_sandbox_nothing_runs_unless_somebody_says_so(
+    three, without_running, monkeypatch
+):
     monkeypatch.setattr(sandbox.shutil, "which", lambda _: None)
-    options = ["grade", str(three), "--out", str(three.parent / f"{three.name}.csv"), "--masters", str(FIXTURES)]
+    options = [
+        "grade",
+        str(three),
+        "--out",
+        str(three.parent / f"{three.name}.csv"),
+        "--masters",
+        str(FIXTURES),
+    ]
     result = CliRunner().invoke(cli.main, options)
     assert result.exit_code == 1 and without_running == []
-    assert "bubblewrap is not installed" in result.output and "could read the right answers" in result.output
+    assert (
+        "bubblewrap is not installed" in result.output
+        and "could read the right answers" in result.output
+    )
     assert "--sandbox none runs them without protection" in result.output
     monkeypatch.setattr(course.sys, "stdin", type("Terminal", (), {"isatty": lambda _: True})())
     monkeypatch.setattr(course.click, "confirm", lambda *_, **__: True)
@@ -538,17 +664,32 @@ def test_without_a_sandbox_nothing_runs_unless_somebody_says_so(three, without_r
 
 
 def test_what_is_not_read_is_named(tmp_path):
-    """Links, hidden notebooks, archives and other names get nothing, and each has a row; copies by programs have none."""
+    """Links, hidden notebooks, archives and other names get nothing, and each has a row; copies by
+    programs have none."""
     folder, own = tmp_path / "returned", tmp_path / "solution.ipynb"
     own.write_text(json.dumps(solved()), encoding="utf-8")
     for name in ("A", "B/__MACOSX", "B/.ipynb_checkpoints", ".C", "pipe.ipynb"):
         (folder / name).mkdir(parents=True)
     (folder / "A" / "b.ipynb").symlink_to(own)
     (folder / "linked").symlink_to(tmp_path)
-    copies = ("B/__MACOSX/._b", "B/._b", "B/.ipynb_checkpoints/b-checkpoint", "B/.ipynb_checkpoints/lost-checkpoint")
+    copies = (
+        "B/__MACOSX/._b",
+        "B/._b",
+        "B/.ipynb_checkpoints/b-checkpoint",
+        "B/.ipynb_checkpoints/lost-checkpoint",
+    )
     for name in ("B/b", *copies):
         (folder / f"{name}.ipynb").write_bytes(own.read_bytes())
-    for name in (".C/b.IPYNB", "A/c.ipynb.txt", "A/d.ipynb.json", "A/e.py", "A/f.HTML", "A/g.json", "B/b.html", "B/b.py"):
+    for name in (
+        ".C/b.IPYNB",
+        "A/c.ipynb.txt",
+        "A/d.ipynb.json",
+        "A/e.py",
+        "A/f.HTML",
+        "A/g.json",
+        "B/b.html",
+        "B/b.py",
+    ):
         (folder / name).write_bytes(own.read_bytes())
     (folder / "Петров.ZIP").write_bytes(b"PK")
     works = {work.name: work for work in submissions.returned(folder, masters=FIXTURES)}
@@ -565,17 +706,24 @@ def test_what_is_not_read_is_named(tmp_path):
         "Петров.ZIP": "an archive: unpack it",
         "B/b.ipynb": "",
     }
-    assert {name: work.problem[: len(problems.get(name, ""))] for name, work in works.items()} == problems
-    grades = {name: marking.grade(work, SETTING, start=InsideKernel) for name, work in works.items()}
+    assert {
+        name: work.problem[: len(problems.get(name, ""))] for name, work in works.items()
+    } == problems
+    grades = {
+        name: marking.grade(work, SETTING, start=InsideKernel) for name, work in works.items()
+    }
     assert {name for name, grade in grades.items() if grade.marks} == {"B/b.ipynb"}
-    assert all(grade.note and not grade.digest for name, grade in grades.items() if name != "B/b.ipynb")
+    assert all(
+        grade.note and not grade.digest for name, grade in grades.items() if name != "B/b.ipynb"
+    )
 
 
 EASY = {"name": "53", "state": "v", "meter": "x + w", "parameters": {}}
 
 
 def brings_its_own_variant():
-    """Set a solved for an easy table that the opening cell brings along under the name of the variant given."""
+    """Set a solved for an easy table that the opening cell brings along under the name of the
+    variant given."""
     return solution(render(read("a"), exercise("a", EASY)))
 
 
@@ -583,15 +731,28 @@ def brings_its_own_variant():
 def test_a_table_of_its_own_gets_nothing(graded_here, given):
     found, *_ = graded_here(brings_its_own_variant(), given, masters=None)
     assert "passed" not in found.marks.values()
-    assert f"marked as variant 53{', which was given' * bool(given)}, and opens one of its own" in found.note
+    assert (
+        f"marked as variant 53{', which was given' * bool(given)}, and opens one of its own"
+        in found.note
+    )
 
 
 def test_a_list_with_unknown_variants_is_refused(three):
     (three / "list.csv").write_text("name,group,variant\nA,1,mine\n", encoding="utf-8")
-    options = ["grade", str(three), "--masters", str(FIXTURES), "--students", str(three / "list.csv")]
+    options = [
+        "grade",
+        str(three),
+        "--masters",
+        str(FIXTURES),
+        "--students",
+        str(three / "list.csv"),
+    ]
     result = CliRunner().invoke(cli.main, options)
     assert result.exit_code == 1
-    assert "gives A the variant mine, which is not known; name the file that you handed out with --variants" in result.output
+    assert (
+        "gives A the variant mine, which is not known; name the file that you handed out with "
+        "--variants" in result.output
+    )
 
 
 def test_whose_variant_it_is_tells_the_path_or_the_notebook(three):
@@ -599,7 +760,9 @@ def test_whose_variant_it_is_tells_the_path_or_the_notebook(three):
         notebook = claims(student=whom)
         (three / f"{name}.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
     (three / "1" / "Петрова Анна").mkdir(parents=True)
-    (three / "1" / "Петрова Анна" / "x.ipynb").write_text(json.dumps(claims(student="Иванов Иван, 1")), encoding="utf-8")
+    (three / "1" / "Петрова Анна" / "x.ipynb").write_text(
+        json.dumps(claims(student="Иванов Иван, 1")), encoding="utf-8"
+    )
     listed = [Student("Иванов Иван", "1", "7"), Student("Петрова Анна", "1", "20")]
     found = submissions.returned(three, masters=FIXTURES, given=course._given(listed))
     assert {one.name: one.variant for one in found} == {
@@ -607,7 +770,10 @@ def test_whose_variant_it_is_tells_the_path_or_the_notebook(three):
     }  # fmt: skip
     other = submissions.returned(three, masters=FIXTURES, given=course._given(None))
     digests = [{one.name: one.digest for one in some} for some in (found, other)]
-    assert {name for name in digests[0] if digests[0][name] != digests[1][name]} == {"a.ipynb", "1/Петрова Анна/x.ipynb"}
+    assert {name for name in digests[0] if digests[0][name] != digests[1][name]} == {
+        "a.ipynb",
+        "1/Петрова Анна/x.ipynb",
+    }
 
 
 def change_file(path):
@@ -620,7 +786,9 @@ def change_file(path):
 @pytest.fixture
 def three(tmp_path):
     for name in "abc":
-        (tmp_path / f"{name}.ipynb").write_text(json.dumps(handed_out()) + " " * ord(name), encoding="utf-8")
+        (tmp_path / f"{name}.ipynb").write_text(
+            json.dumps(handed_out()) + " " * ord(name), encoding="utf-8"
+        )
     return tmp_path
 
 
@@ -634,13 +802,18 @@ def test_a_kernel_that_does_not_start_is_a_row(three):
 
 def test_no_notebooks_is_an_error(tmp_path):
     result = CliRunner().invoke(cli.main, ["grade", str(tmp_path)])
-    assert (result.exit_code, result.output) == (1, f"Error: no notebooks (*.ipynb) in {tmp_path}\n")
+    assert (result.exit_code, result.output) == (
+        1,
+        f"Error: no notebooks (*.ipynb) in {tmp_path}\n",
+    )
 
 
 def test_the_same_answers_in_another_order_are_the_same_work():
-    """A copied notebook is known though its cells were moved, and its comments changed; another answer makes another one."""
+    """A copied notebook is known though its cells were moved, and its comments changed; another
+    answer makes another one."""
     first, second = (
-        Cell(i, f"c{i}", "", text) for i, text in enumerate(("def one(a):\n    return a", "def two(b):\n    return b"))
+        Cell(i, f"c{i}", "", text)
+        for i, text in enumerate(("def one(a):\n    return a", "def two(b):\n    return b"))
     )
     other = Cell(1, "c1", "", "def two(b):  # mine\n    return b")
     names = {"one", "two"}
@@ -648,7 +821,8 @@ def test_the_same_answers_in_another_order_are_the_same_work():
     assert code_of([first], names) != code_of([first, second], names)
     assert code_of([first], {"three"}) == ""
     longest = Cell(1, "", "", f"def one(x):\n    return {' + '.join(['x'] * 2000)}")
-    assert code_of([longest], names)  # deeper than Python's stack, if its parts were called one in the other
+    # deeper than Python's stack, if its parts were called one in the other
+    assert code_of([longest], names)
 
 
 @pytest.mark.parametrize("document", [{}, {"cells": {}}, {"worksheets": []}])
@@ -657,7 +831,10 @@ def test_notebooks_without_cells_are_explained(document):
         cells_of(document)
 
 
-@pytest.mark.parametrize("claim", [7, "b", [], {}, {"set": "b"}, {"set": ["b"], "variant": "53"}, {"set": "b", "variant": None}])
+@pytest.mark.parametrize(
+    "claim",
+    [7, "b", [], {}, {"set": "b"}, {"set": ["b"], "variant": "53"}, {"set": "b", "variant": None}],
+)
 def test_strange_claims_are_explained(claim):
     with pytest.raises(Unreadable, match=r"claims set|no variant 'None'"):
         claimed(claim, [], None)
@@ -668,24 +845,38 @@ def test_the_variant_is_the_one_that_was_given(tmp_path):
     """Never the notebook's: not its name, and no table that it brings along."""
     claim, easy = {"set": "b", "variant": "mine"}, {"name": "53", "state": "v", "meter": "x + w"}
     file = tmp_path / "mine.toml"
-    file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.9 }\n', encoding="utf-8")
+    file.write_text(
+        '[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.9 }\n',
+        encoding="utf-8",
+    )
     found, notes = claimed(claim, [Cell(1, "", "", f'task = exercise("b", {MINE!r})')], file)
     assert float(found.model.parameters["q"]) == 0.9
     assert notes == ["marked as variant mine, and opens one of its own that has this name"]
-    found, notes = claimed({"set": "b", "variant": "7"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None, "53")
+    found, notes = claimed(
+        {"set": "b", "variant": "7"},
+        [Cell(1, "", "", f'task = exercise("b", {easy!r})')],
+        None,
+        "53",
+    )
     assert found.variant == exercise("b", "53").variant
     assert notes == [
         "for variant 7, and marked as variant 53, which was given",
         "marked as variant 53, which was given, and opens one of its own that has this name",
     ]
-    found, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None)
+    found, notes = claimed(
+        {"set": "b", "variant": "53"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None
+    )
     assert found.variant == exercise("b", "53").variant and len(notes) == 1
     with pytest.raises(ValueError, match="no variant 'mine'"):
         claimed(claim, [], None)
-    _, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", 'x = exercise("a", variant="7")')], None)
+    _, notes = claimed(
+        {"set": "b", "variant": "53"}, [Cell(1, "", "", 'x = exercise("a", variant="7")')], None
+    )
     assert notes == ["opens set a, variant 7"]
     for opening in ("exercise(letter, 1)\n!ls", 'task = exercise("b", "53")'):
-        assert claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", opening)], None, "53")[1] == []
+        assert (
+            claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", opening)], None, "53")[1] == []
+        )
 
 
 def sources(cells, notebook=None):
@@ -757,7 +948,8 @@ def test_what_a_library_has_not_implemented_is_no_stub(graded_here):
 def test_a_copy_of_an_answer_for_trials_does_not_replace_it():
     notebook = solved()
     trial = nbformat.from_dict(cell(notebook, "def gain"))
-    trial.source, trial.id = trial.source.replace("cross = G @ Psi", "cross = 0"), "copy"  # its metadata are copied too
+    # its metadata are copied too
+    trial.source, trial.id = trial.source.replace("cross = G @ Psi", "cross = 0"), "copy"
     notebook.cells.append(trial)
     steps, _ = assembled(handed_out(), cells_of(notebook))
     assert ["cross = 0" in step.source for step in steps] == [False] * 6 + [True]
@@ -765,10 +957,15 @@ def test_a_copy_of_an_answer_for_trials_does_not_replace_it():
 
 def test_answers_are_known_by_name_when_the_master_has_moved_on():
     """A cell was added to the master since: all ids behind it have shifted."""
-    added = TINY.replace("### Question 1", "```{code-cell} python\nextra = 1\n```\n\n### Question 1")
+    added = TINY.replace(
+        "### Question 1", "```{code-cell} python\nextra = 1\n```\n\n### Question 1"
+    )
     master = student(render(added, exercise("b", "53")), {})
     found, _ = sources(cells_of(solved()), master)
-    assert [line for line in found if line.startswith("def")] == ["def gain(Psi, G, F):", "def correct(lam, Psi, h, G, F, y):"]
+    assert [line for line in found if line.startswith("def")] == [
+        "def gain(Psi, G, F):",
+        "def correct(lam, Psi, h, G, F, y):",
+    ]
     assert found.index('task.check("b1", gain)') > found.index("def gain(Psi, G, F):")
 
 

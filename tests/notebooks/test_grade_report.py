@@ -29,7 +29,9 @@ SIGN = next(
 
 
 def graded(name, letter="b", variant="53", passed=(), student="", work="w", looks=(), **told):
-    marks = {one.name: PASSED if one.name in passed else NOT_RUN for one in sets()[letter].questions}
+    marks = {
+        one.name: PASSED if one.name in passed else NOT_RUN for one in sets()[letter].questions
+    }
     told |= {one: Comment("right") for one in passed}
     marks |= {one: WRONG for one, said in told.items() if said.says != "right"}
     return Grade(name, "graded", letter, variant, marks, (), looks, name, told, student, work)
@@ -37,7 +39,10 @@ def graded(name, letter="b", variant="53", passed=(), student="", work="w", look
 
 @pytest.mark.quick
 def test_the_group_in_a_path_tells_more_than_a_longer_name():
-    short, long = Student("Иванов Иван", "РТ-1", "53", "b"), Student("Иванов Иван Петрович", "РТ-2", "7", "b")
+    short, long = (
+        Student("Иванов Иван", "РТ-1", "53", "b"),
+        Student("Иванов Иван Петрович", "РТ-2", "7", "b"),
+    )
     for students in ([short, long], [long, short]):
         assert owner(graded("РТ-1/Иванов Иван Петрович/b.ipynb"), students) == short
         assert owner(graded("РТ-2/Иванов Иван Петрович/b.ipynb"), students) == long
@@ -50,7 +55,8 @@ def test_the_group_in_a_path_tells_more_than_a_longer_name():
     [
         ("РТ-1/Иванов-Иван/b-aof.ipynb", "", IVANOV),
         ("РТ-2/Иванов-Иван/b-aof.ipynb", "", OTHER),
-        ("rt/Иван Иванов_1234_assignsubmission_file_/x.ipynb", "", None),  # two of that name, and no group
+        # two of that name, and no group
+        ("rt/Иван Иванов_1234_assignsubmission_file_/x.ipynb", "", None),
         ("Анна ПЕТРОВА_77_assignsubmission_file_/x.ipynb", "", PETROVA),
         ("b-Петрова-Анна.ipynb", "", PETROVA),
         ("b-aof.ipynb", "Петрова Анна, РТ-1", PETROVA),
@@ -99,7 +105,9 @@ def test_flags():
 
 def test_without_a_list_a_folder_is_a_student():
     grades = [graded("РТ-1/A/b.ipynb"), graded("РТ-1/A/c.ipynb", "c"), graded("B.ipynb")]
-    assert [of_folder(one) for one in grades] == [Student("A", "РТ-1", "")] * 2 + [Student("B", "", "")]
+    assert [of_folder(one) for one in grades] == [Student("A", "РТ-1", "")] * 2 + [
+        Student("B", "", "")
+    ]
     persons, strangers = people([*grades, Grade("n.ipynb", "not an exercise notebook")])
     found = [(one.student.name, sorted(one.grades), one.flags) for one in persons]
     assert found == [("B", ["b"], ["missing: c"]), ("A", ["b", "c"], [])]
@@ -109,7 +117,11 @@ def test_without_a_list_a_folder_is_a_student():
 @pytest.mark.quick
 def test_points_are_the_weights_of_the_levels():
     assert possible("b") == sum(WEIGHTS[one.level] for one in sets()["b"].questions)
-    assert possible("abc") == sum(possible(letter) for letter in "abc") == sum(possible("abc", level) for level in WEIGHTS)
+    assert (
+        possible("abc")
+        == sum(possible(letter) for letter in "abc")
+        == sum(possible("abc", level) for level in WEIGHTS)
+    )
     everything = {one.name: PASSED for one in sets()["b"].questions}
     assert points([Grade("x", "graded", "b", marks=everything)], USUAL) == possible("b")
     some = Grade("x", "graded", "b", marks=everything | {"b1": WRONG, "b2": UNUSABLE})
@@ -120,7 +132,11 @@ def test_points_are_the_weights_of_the_levels():
 @pytest.mark.quick
 def test_what_a_wrong_answer_is_worth_is_the_teachers_choice():
     """b2 has a third of its results right, b3 is right on top of the wrong b1, b4 both."""
-    told = {"b1": Comment("no"), "b2": Comment("no", share=1 / 3), "b3": Comment("no", follows=("b1",))}
+    told = {
+        "b1": Comment("no"),
+        "b2": Comment("no", share=1 / 3),
+        "b3": Comment("no", follows=("b1",)),
+    }
     grade = graded("x", **told, b4=Comment("no", share=0.25, follows=("b2",)))
     assert grade.marks["b3"] == WRONG
     for credit, expected in (
@@ -162,7 +178,10 @@ def table(path):
 def test_a_row_for_each_student_and_question(written):
     folder, _ = written
     rows = table(folder / "students.csv")
-    assert [(row["name"], row["set b"], row["warm-up"], row["core"], row["stretch"], row["points"]) for row in rows] == [
+    assert [
+        (row["name"], row["set b"], row["warm-up"], row["core"], row["stretch"], row["points"])
+        for row in rows
+    ] == [
         ("Иванов Иван", "4", "1", "0", "3", "4"),
         ("Петрова Анна", "1", "1", "0", "0", "1"),
         ("Иванов Иван", "", "0", "0", "0", "0"),
@@ -178,7 +197,8 @@ def test_pages(written):
     folder, _ = written
     page = (folder / "feedback" / "РТ-1" / "Иванов-Иван.html").read_text(encoding="utf-8")
     assert "<b>4</b> of 17 points" in page
-    assert "The <code>sign</code>: &lt;b&gt;look&lt;/b&gt;" in page  # nothing of a student's becomes HTML
+    # nothing of a student's becomes HTML
+    assert "The <code>sign</code>: &lt;b&gt;look&lt;/b&gt;" in page
     assert "Nothing came back." in page  # of set c
     assert (folder / "feedback" / "РТ-2" / "Иванов-Иван.html").exists()
     page = (folder / "overview.html").read_text(encoding="utf-8")

@@ -1,4 +1,5 @@
-"""Notebooks that students have got already, of an earlier version and variant 53: they open, and are graded, as they did."""
+"""Notebooks that students have got already, of an earlier version and variant 53: they open, and
+are graded, as they did."""
 
 import json
 from pathlib import Path
@@ -21,8 +22,13 @@ def test_there_are_ten():
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_every_cell_runs_up_to_the_first_stub(path):
-    """What they import and open is there; each question is asked, and answered by nothing but "not implemented"."""
-    cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    """What they import and open is there; each question is asked, and answered by nothing but "not
+    implemented"."""
+    cells = [
+        cell
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+        if cell["cell_type"] == "code"
+    ]
     last = max(i for i, cell in enumerate(cells) if "check" in cell["metadata"].get("tags", []))
     namespace, found = {}, {}
     for cell in cells[: last + 1]:
@@ -34,12 +40,16 @@ def test_every_cell_runs_up_to_the_first_stub(path):
                 found[result.question] = result.status
         except NotImplementedError:
             assert "raises-exception" in cell["metadata"].get("tags", [])
-    assert found == dict.fromkeys([question.name for question in sets()[path.name[0]].questions], "not implemented")
+    assert found == dict.fromkeys(
+        [question.name for question in sets()[path.name[0]].questions], "not implemented"
+    )
 
 
 @pytest.mark.parametrize("name", ["b-aof.ipynb", "e-comparison.ipynb"])
 def test_they_are_graded(name):
     (work,) = (work for work in submissions.returned(FOLDER) if work.name == name)
-    grade = marking.grade(work, marking.Setting(Site(Path("stage"), Sandbox("none")), "salt"), start=InsideKernel)
+    grade = marking.grade(
+        work, marking.Setting(Site(Path("stage"), Sandbox("none")), "salt"), start=InsideKernel
+    )
     assert (grade.status, grade.note, grade.student) == ("graded", "", "Иванов Иван, РТ-1")
     assert set(grade.marks.values()) == {"not implemented"}

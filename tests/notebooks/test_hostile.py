@@ -1,4 +1,5 @@
-"""Notebooks that mean harm: they are marked as their answers deserve, and end neither the run nor another notebook."""
+"""Notebooks that mean harm: they are marked as their answers deserve, and end neither the run nor
+another notebook."""
 
 import json
 import os
@@ -29,8 +30,12 @@ POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
 def known():
-    """What a student can learn by heart: the arguments of the immediate check, and the right answers."""
-    return [(values[0].ravel()[:3].tolist(), B1.answer(TASK)(*values).tolist()) for values in B1.arguments(TASK)]
+    """What a student can learn by heart: the arguments of the immediate check, and the right
+    answers."""
+    return [
+        (values[0].ravel()[:3].tolist(), B1.answer(TASK)(*values).tolist())
+        for values in B1.arguments(TASK)
+    ]
 
 
 def filled(code, **values):
@@ -49,7 +54,10 @@ def kernel_in(sandbox, staged, seconds=120.0, task=TASK):
     return Kernel(Site(staged, sandbox), opening, seconds)
 
 
-OPEN = Step("import numpy as np\nfrom kfcourse.checks import exercise\ntask = exercise('b', '53')", "opening")
+OPEN = Step(
+    "import numpy as np\nfrom kfcourse.checks import exercise\ntask = exercise('b', '53')",
+    "opening",
+)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +72,9 @@ def outside(tmp_path_factory):
 def kernel(staged, tmp_path_factory):
     """One process for all tricks that leave it alive; the others end it, and it is started anew."""
     problem = sandbox.problem(tmp_path_factory.mktemp("tried"), staged)
-    with kernel_in(Sandbox("none") if problem else Sandbox("bwrap", tuple(map(str, answers()))), staged) as started:
+    with kernel_in(
+        Sandbox("none") if problem else Sandbox("bwrap", tuple(map(str, answers()))), staged
+    ) as started:
         Marking(TASK, SALT).run(started, [OPEN])
         yield started
 
@@ -103,10 +113,17 @@ def test_no_function_gets_more_than_it_deserves(kernel, name, monkeypatch):
     assert result and result.passed, result
 
 
-def test_an_endless_answer_is_ended_as_early_as_a_cell_and_the_time_said_is_its_own(kernel, monkeypatch):
+def test_an_endless_answer_is_ended_as_early_as_a_cell_and_the_time_said_is_its_own(
+    kernel, monkeypatch
+):
     monkeypatch.setattr(kernel, "seconds", 1.0)
-    result = marked(kernel, Step("def gain(Psi, G, F):\n    while True:\n        pass", "answer"), CHECK)
-    assert (result.status, result.message) == ("unusable", "still running after 1 s: is there a loop that never ends?")
+    result = marked(
+        kernel, Step("def gain(Psi, G, F):\n    while True:\n        pass", "answer"), CHECK
+    )
+    assert (result.status, result.message) == (
+        "unusable",
+        "still running after 1 s: is there a loop that never ends?",
+    )
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -138,7 +155,11 @@ def test_no_key_is_on_the_stage(staged):
     names = {path.name for path in staged.rglob("*") if path.suffix != ".pyc"}
     assert {"companion.py", "exercises.py", "session.py"} <= names
     assert not {
-        name for name in names if name.startswith(("keys", "questions", "mistakes", "hidden", "messages", "shared", "statement"))
+        name
+        for name in names
+        if name.startswith(
+            ("keys", "questions", "mistakes", "hidden", "messages", "shared", "statement")
+        )
     }
     of_answers = {B1.answer(TASK).__module__.rpartition(".")[2]}
     assert not {name for name in names if name.removesuffix(".py") in of_answers}
@@ -174,22 +195,39 @@ def test_a_sandbox_holds(staged, outside, tmp_path, port):
     """Everything at once, then a right answer: it passes, and nothing has happened outside."""
     flag, written = tmp_path / "flag", outside / "written"
     box = bubblewrap(staged, tmp_path, outside)
-    values = {"OTHER": str(outside / "other.ipynb"), "OUTSIDE": str(written), "FLAG": str(flag), "PORT": port}
+    values = {
+        "OTHER": str(outside / "other.ipynb"),
+        "OUTSIDE": str(written),
+        "FLAG": str(flag),
+        "PORT": port,
+    }
     steps = [Step(filled(code, **values), name, own=True) for name, code in PROCESSES.items()]
-    listed = f"import os\nassert not os.path.exists({str(answers()[0])!r}) or not os.listdir({str(answers()[0])!r})"
+    listed = (
+        f"import os\nassert not os.path.exists({str(answers()[0])!r}) or not "
+        f"os.listdir({str(answers()[0])!r})"
+    )
     marking = Marking(TASK, SALT)
     with kernel_in(box, staged) as kernel:
-        marking.run(kernel, [OPEN, *steps, Step(listed, "keys", own=True), Step(RIGHT, "answer"), CHECK])
+        marking.run(
+            kernel, [OPEN, *steps, Step(listed, "keys", own=True), Step(RIGHT, "answer"), CHECK]
+        )
     assert marking.notes == [] and marking.marks["b1"] == "passed"
     told = " ".join(marking.errors)
-    assert not [word for word in ("has read", "has written", "has connected", "keys") if word in told], told
+    assert not [
+        word for word in ("has read", "has written", "has connected", "keys") if word in told
+    ], told
     assert not written.exists() and not flag.exists()
 
 
 @POSIX
 def test_who_kills_its_process_is_not_graded_and_the_next_is(staged, tmp_path):
-    """Without a sandbox: its own process, then the grading process; the same grader goes on with the next notebook."""
-    for name, trick in (("1", "import os\nos.kill(os.getpid(), 9)"), ("2", PROCESSES["kills its parent"]), ("3", "")):
+    """Without a sandbox: its own process, then the grading process; the same grader goes on with
+    the next notebook."""
+    for name, trick in (
+        ("1", "import os\nos.kill(os.getpid(), 9)"),
+        ("2", PROCESSES["kills its parent"]),
+        ("3", ""),
+    ):
         notebook = solved()
         cell(notebook, "def gain").source += "\n" + trick
         (tmp_path / f"{name}.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
@@ -216,7 +254,11 @@ def test_an_answer_whose_process_is_killed_is_not_graded(staged, tmp_path, kind)
     """It may be a stub that nobody has touched: what came of it must not count as an answer."""
     box = bubblewrap(staged, tmp_path) if kind == "bwrap" else Sandbox("none")
     marking = Marking(TASK, SALT)
-    killing = Step(f"def gain(Psi, G, F):\n    import os\n    os.kill({1 if kind == 'bwrap' else 'os.getpid()'}, 9)", "x")
+    killing = Step(
+        f"def gain(Psi, G, F):\n    import os\n    "
+        f"os.kill({1 if kind == 'bwrap' else 'os.getpid()'}, 9)",
+        "x",
+    )
     with kernel_in(box, staged) as kernel:
         if kind == "bwrap":  # nothing in it can kill its first process
             request = kernel._request
@@ -238,8 +280,13 @@ def test_nothing_of_the_teachers_path_is_in_the_sandbox(staged, tmp_path, monkey
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "mine"))
     with kernel_in(bubblewrap(staged, tmp_path), staged) as kernel:
         assert kernel.cell("import keys_of_the_exam").error.startswith("ModuleNotFoundError")
-        assert kernel.cell(f"open({str(tmp_path / 'mine' / 'keys_of_the_exam.py')!r})").error.startswith("FileNotFoundError")
-        assert kernel.cell("import os\nassert not os.environ['PYTHONPATH'].count(os.pathsep)").error == ""
+        assert kernel.cell(
+            f"open({str(tmp_path / 'mine' / 'keys_of_the_exam.py')!r})"
+        ).error.startswith("FileNotFoundError")
+        assert (
+            kernel.cell("import os\nassert not os.environ['PYTHONPATH'].count(os.pathsep)").error
+            == ""
+        )
 
 
 # -- the grading process itself hangs or ends
@@ -257,7 +304,9 @@ def ends(*_):
     ("fate", "seconds", "problem"),
     [(hangs, 1.0, "the grading process hung"), (ends, 60.0, "the grading process was killed")],
 )
-def test_a_notebook_that_stops_or_ends_the_grading_process_is_a_row(tmp_path, monkeypatch, staged, fate, seconds, problem):
+def test_a_notebook_that_stops_or_ends_the_grading_process_is_a_row(
+    tmp_path, monkeypatch, staged, fate, seconds, problem
+):
     """As a comparison in compiled code might that no alarm interrupts, or that takes all memory."""
     (tmp_path / "x.ipynb").write_text("{}", encoding="utf-8")
     (work,) = returned(tmp_path, seconds=0.1)

@@ -30,18 +30,29 @@ def forked(monkeypatch):
 
 def run(*cells: str, folder: Path, seconds: float = 60):
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
-    client = NotebookClient(notebook, timeout=seconds, kernel_name="python3", resources={"metadata": {"path": str(folder)}})
+    client = NotebookClient(
+        notebook,
+        timeout=seconds,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(folder)}},
+    )
     try:
         client.execute()
     finally:
         assert client.km is None or not client.km.has_kernel
-    return [[output.get("text", output.get("data")) for output in cell.outputs] for cell in notebook.cells]
+    return [
+        [output.get("text", output.get("data")) for output in cell.outputs]
+        for cell in notebook.cells
+    ]
 
 
 def test_the_libraries_are_there_before_they_are_imported(tmp_path):
-    forkserver._forkserver._stop()  # one that grading has started in this process has other libraries
+    # one that grading has started in this process has other libraries
+    forkserver._forkserver._stop()
     ((loaded,), (names,)) = run(
-        f"import sys; print(all(name in sys.modules for name in {IMPORTED}))", "print(sorted(dir()))", folder=tmp_path
+        f"import sys; print(all(name in sys.modules for name in {IMPORTED}))",
+        "print(sorted(dir()))",
+        folder=tmp_path,
     )
     assert loaded == "True\n"
     assert "sympy" not in names and "np" not in names, "the names of a notebook are its own"
@@ -51,18 +62,24 @@ def test_it_has_the_folder_and_the_environment_of_its_notebook(tmp_path, monkeyp
     for value in ("first", "second"):  # the fork server knows the first only
         monkeypatch.setenv("KFCOURSE_TOLD", value)
         (tmp_path / value).mkdir()
-        ((told,),) = run("import os; print(os.environ['KFCOURSE_TOLD'], os.getcwd())", folder=tmp_path / value)
+        ((told,),) = run(
+            "import os; print(os.environ['KFCOURSE_TOLD'], os.getcwd())", folder=tmp_path / value
+        )
         assert told == f"{value} {tmp_path / value}\n"
 
 
 def test_it_shows_figures(tmp_path):
-    (outputs,) = run("import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()", folder=tmp_path)
+    (outputs,) = run(
+        "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()", folder=tmp_path
+    )
     assert "image/png" in outputs[-1]
 
 
 def test_one_notebook_does_not_see_another(tmp_path):
     run("import sympy\nsympy.mine = 1\nsecret = 2", folder=tmp_path)
-    ((seen,),) = run("import sympy\nprint(hasattr(sympy, 'mine'), 'secret' in globals())", folder=tmp_path)
+    ((seen,),) = run(
+        "import sympy\nprint(hasattr(sympy, 'mine'), 'secret' in globals())", folder=tmp_path
+    )
     assert seen == "False False\n"
 
 
@@ -94,11 +111,16 @@ def test_its_death_is_noticed(tmp_path):
 
 
 def test_it_ends_with_the_process_that_wanted_it_however_that_ends():
-    """The fork server lives as long as one of its forks does, and they as long as it: both were left."""
+    """The fork server lives as long as one of its forks does, and they as long as it: both were
+    left."""
     starts = (
-        "import os; from jupyter_client.manager import start_new_kernel; from kfcourse.notebooks import kernels\n"
+        "import os; from jupyter_client.manager import start_new_kernel; from kfcourse.notebooks "
+        "import kernels\n"
         "kernels.IMPORTED[:] = ['ipykernel.kernelapp']\n"
-        "manager, client = start_new_kernel(); print(manager.provisioner.pid, flush=True); os.kill(os.getpid(), 9)"
+        "manager, client = start_new_kernel(); print(manager.provisioner.pid, flush=True); "
+        "os.kill(os.getpid(), 9)"
     )
-    started = subprocess.run([sys.executable, "-c", starts], stdout=subprocess.PIPE, text=True, timeout=60)
+    started = subprocess.run(
+        [sys.executable, "-c", starts], stdout=subprocess.PIPE, text=True, timeout=60
+    )
     assert ended(int(started.stdout))

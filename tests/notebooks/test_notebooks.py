@@ -1,4 +1,5 @@
-"""Exercise notebooks: what masters become, what is written, and what happens if something fails on the way."""
+"""Exercise notebooks: what masters become, what is written, and what happens if something fails on
+the way."""
 
 import ast
 import re
@@ -82,7 +83,11 @@ def code(notebook):
 
 
 def contents(folder):
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 # -- masters
@@ -92,13 +97,19 @@ def contents(folder):
 def test_solution_and_stub():
     notebook = tiny()
     answer = code(student(notebook, {}))[1]
-    assert answer.source == f'def gain(Psi, G, F):\n    """K, (N, n, p)."""\n    {STUB}\n    raise NotImplementedError'
+    assert (
+        answer.source == f'def gain(Psi, G, F):\n    """K, (N, n, p)."""\n    {STUB}\n    raise '
+        f"NotImplementedError"
+    )
     assert answer.metadata["kfcourse"] == {"answer": "gain"}
     assert code(solution(notebook))[1].source.splitlines()[2:] == [
         "    cross = G @ Psi",
         "    return np.swapaxes(np.linalg.solve(F, cross), -1, -2)",
     ]
-    texts = ["\n".join(cell.source for cell in n.cells) for n in (student(notebook, {}), solution(notebook))]
+    texts = [
+        "\n".join(cell.source for cell in n.cells)
+        for n in (student(notebook, {}), solution(notebook))
+    ]
     assert ["solution's" in text for text in texts] == [False, True]
     assert not any("SOLUTION" in text for text in texts)
     assert "correct_name = correct.__name__" in texts[0]  # what stands behind the end marker stays
@@ -113,16 +124,31 @@ def test_notebook_knows_its_set_and_variant():
     nbformat.validate(notebook)
 
 
-AFTER, WITHOUT = "END SOLUTION without BEGIN SOLUTION before it", "BEGIN SOLUTION without END SOLUTION"
+AFTER, WITHOUT = (
+    "END SOLUTION without BEGIN SOLUTION before it",
+    "BEGIN SOLUTION without END SOLUTION",
+)
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("    # BEGIN SOLUTION\n    cross", "    cross", rf"master b-aof, cell \d+, line 5: {AFTER}"),
-        ("    cross = G @ Psi\n", "    # BEGIN SOLUTION\n", rf"master b-aof, cell \d+, line 4: {WITHOUT} before it"),
-        ("swapaxes(np.linalg.solve(F, cross), -1, -2)\n    # END SOLUTION", "a", rf"master b-aof, cell \d+: {WITHOUT}$"),
+        (
+            "    # BEGIN SOLUTION\n    cross",
+            "    cross",
+            rf"master b-aof, cell \d+, line 5: {AFTER}",
+        ),
+        (
+            "    cross = G @ Psi\n",
+            "    # BEGIN SOLUTION\n",
+            rf"master b-aof, cell \d+, line 4: {WITHOUT} before it",
+        ),
+        (
+            "swapaxes(np.linalg.solve(F, cross), -1, -2)\n    # END SOLUTION",
+            "a",
+            rf"master b-aof, cell \d+: {WITHOUT}$",
+        ),
         ("[= variant =]", "[= variant", r"master b-aof, line \d+: "),
         ("[= variant =]", "[= nothing =]", "master b-aof: 'nothing' is undefined"),
         ("[= variant =]", "[% if %]", r"master b-aof, line 13: "),
@@ -138,7 +164,7 @@ def test_errors_of_a_master_name_the_place(old, new, message):
 def test_statement_is_a_page_without_solutions():
     page = statement(tiny(), {})
     assert "secret" not in page and "solve" not in page and "SOLUTION" not in page
-    assert f"```python\ndef gain(Psi, G, F):\n    \"\"\"K, (N, n, p).\"\"\"\n    {STUB}" in page  # fmt: skip
+    assert f'```python\ndef gain(Psi, G, F):\n    """K, (N, n, p)."""\n    {STUB}' in page
 
 
 @pytest.mark.quick
@@ -146,13 +172,19 @@ def test_what_draws_a_picture_is_folded_under_it():
     drawn = next(cell.id for cell in tiny().cells if "picture" in cell.metadata.get("tags", []))
     page = statement(tiny(), {drawn: ("drawn.png", 720)})
     figure, code = page.index("```{figure} drawn.png\n"), page.index('<details class="kf-code">')
-    assert figure < code < page.index("plt.show()") < page.index("</details>", code) and ":width: 720px" in page
+    assert (
+        figure < code < page.index("plt.show()") < page.index("</details>", code)
+        and ":width: 720px" in page
+    )
     assert page.count('<details class="kf-code">') == 1
 
 
 def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.5 }\n', encoding="utf-8")
+    file.write_text(
+        '[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.5 }\n',
+        encoding="utf-8",
+    )
     variant = load_variants(file)["mine"]
     notebook = render(TINY, exercise("b", {"name": "mine", **variant.table}))
     line = next(line for line in code(notebook)[0].source.splitlines() if line.startswith("task ="))
@@ -165,10 +197,19 @@ def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
 
 x, y, c = sp.symbols("x y c", real=True)
 FORMULAS = [
-    x - sp.Rational(1, 3), x ** sp.Rational(1, 3), sp.E**2, c / sp.sqrt(x * y), 1 / (1 + 1 / sp.sqrt(x)), 2 ** (1 / sp.sqrt(x)),
-    sp.exp(-(x**2) / 2), sp.exp(x) ** y, sp.atan2(y, x), sp.Abs(x), (x + sp.Rational(2, 3)) ** -2,
+    x - sp.Rational(1, 3),
+    x ** sp.Rational(1, 3),
+    sp.E**2,
+    c / sp.sqrt(x * y),
+    1 / (1 + 1 / sp.sqrt(x)),
+    2 ** (1 / sp.sqrt(x)),
+    sp.exp(-(x**2) / 2),
+    sp.exp(x) ** y,
+    sp.atan2(y, x),
+    sp.Abs(x),
+    (x + sp.Rational(2, 3)) ** -2,
     x * (y + c) ** 2 - (x - y) / (c + 1),
-]  # fmt: skip
+]
 
 
 @pytest.mark.quick
@@ -192,7 +233,11 @@ def test_every_line_of_a_stub_is_in_the_solution(letter, variant):
     solved = {cell.id: cell.source for cell in solution(notebook).cells}
     answers = 0
     for cell in student(notebook, {}).cells:
-        own = [line for line in cell.source.splitlines() if STUB not in line and line.strip() != "raise NotImplementedError"]
+        own = [
+            line
+            for line in cell.source.splitlines()
+            if STUB not in line and line.strip() != "raise NotImplementedError"
+        ]
         lines = iter(solved[cell.id].splitlines())
         assert all(line in lines for line in own)  # in this order
         answers += STUB in cell.source
@@ -223,14 +268,19 @@ def test_a_new_notebook_fails_only_with_not_implemented(letter, variant):
                 exec(cell.source, namespace)
             except NotImplementedError:
                 continue
-    assert found == dict.fromkeys([question.name for question in sets()[letter].questions], "not implemented")
+    assert found == dict.fromkeys(
+        [question.name for question in sets()[letter].questions], "not implemented"
+    )
 
 
 # -- executing
 
 
 def test_executed_solution_passes_and_draws(executed):
-    assert [(r["question"], r["status"]) for r in results(executed)] == [("b1", "passed"), ("b2", "passed")]
+    assert [(r["question"], r["status"]) for r in results(executed)] == [
+        ("b1", "passed"),
+        ("b2", "passed"),
+    ]
     (png,) = pictures(executed).values()
     assert png.startswith(b"\x89PNG")
 
@@ -240,7 +290,8 @@ def test_page_needs_no_network(executed):
     assert not REQUEST.search(page)
     assert not re.search(r"@import|url\(\s*[\"']?+(?!data:|#)", page)
     addresses = set(re.findall(r"https?://[^\s\"'<>)]+", page))
-    assert addresses <= {"http://www.w3.org/1998/Math/MathML", "http://www.w3.org/2000/svg"}  # names, not loaded
+    # names, not loaded
+    assert addresses <= {"http://www.w3.org/1998/Math/MathML", "http://www.w3.org/2000/svg"}
     assert page.count("<math") >= 2
     assert 'display="block"' in page and 'display="inline"' in page
     assert "$" not in re.sub(r"<(script|style|pre)\b.*?</\1>", "", page, flags=re.DOTALL)
@@ -256,8 +307,13 @@ def test_mathml_leaves_code_alone():
 
 
 def test_a_failing_cell_is_named():
-    broken = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in ("1", "nothing", "2")])
-    with pytest.raises(NotebookFailed, match=rf"here, cell {broken.cells[1].id}: NameError: name 'nothing' is not defined"):
+    broken = nbformat.v4.new_notebook(
+        cells=[nbformat.v4.new_code_cell(source) for source in ("1", "nothing", "2")]
+    )
+    with pytest.raises(
+        NotebookFailed,
+        match=rf"here, cell {broken.cells[1].id}: NameError: name 'nothing' is not defined",
+    ):
         execution.execute(broken, "here")
 
 
@@ -265,7 +321,9 @@ def test_a_cell_that_takes_too_long_is_named(monkeypatch):
     monkeypatch.setattr(execution, "SECONDS", 5)
     sources = ("1", "import time\ntime.sleep(60)", "2")
     slow = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
-    with pytest.raises(NotebookFailed, match=f"here, cell {slow.cells[1].id}: still running after 5 s"):
+    with pytest.raises(
+        NotebookFailed, match=f"here, cell {slow.cells[1].id}: still running after 5 s"
+    ):
         execution.execute(slow, "here")
 
 
@@ -311,14 +369,18 @@ def test_exercises_have_pictures_and_no_solutions(tmp_path, masters, no_kernel):
 
 def test_without_a_browser_it_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
-    with pytest.raises(NotebookFailed, match="no browser to print PDF with; install one of chromium"):
+    with pytest.raises(
+        NotebookFailed, match="no browser to print PDF with; install one of chromium"
+    ):
         execution.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
 
 
 @pytest.mark.quick
 def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters, monkeypatch):
     monkeypatch.setattr(jobs, "execute", execute_inside)
-    (masters / "b_aof" / "statement.md").write_text(TINY.replace("cross = G @ Psi", "cross = 2 * G @ Psi"), encoding="utf-8")
+    (masters / "b_aof" / "statement.md").write_text(
+        TINY.replace("cross = G @ Psi", "cross = 2 * G @ Psi"), encoding="utf-8"
+    )
     outcome = make(job(tmp_path, masters))
     assert outcome.status == "failed"
     assert re.match(r"the solution does not pass b1: not right\. It is twice", outcome.message)
@@ -331,7 +393,9 @@ def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters, monk
 @pytest.fixture
 def call(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return lambda *arguments: CliRunner().invoke(cli.main, [str(argument) for argument in arguments])
+    return lambda *arguments: CliRunner().invoke(
+        cli.main, [str(argument) for argument in arguments]
+    )
 
 
 def refused(result, *words):
@@ -342,7 +406,9 @@ def refused(result, *words):
         assert word in line
 
 
-def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(call, tmp_path, masters, no_kernel, monkeypatch):
+def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(
+    call, tmp_path, masters, no_kernel, monkeypatch
+):
     """Two processes with kernels write what this process writes without."""
     (masters / "c_duof").mkdir()
     fails = TINY.replace("import matplotlib", "1 / 0\nimport matplotlib", 1)
@@ -358,32 +424,70 @@ def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(ca
     for workers in (1, 2):
         variants = ("--variant", "53", "--variant", "12")
         result = call(
-            "exercises", *variants, "--sets", "b,c,d", "--masters", masters, "--out", f"out{workers}", "--jobs", workers
+            "exercises",
+            *variants,
+            "--sets",
+            "b,c,d",
+            "--masters",
+            masters,
+            "--out",
+            f"out{workers}",
+            "--jobs",
+            workers,
         )
         assert result.exit_code == 1
         failed = [line for line in result.output.splitlines() if line.startswith("FAILED")]
         assert len(failed) == 4
         assert failed[0].startswith("FAILED variant 12, c-duof: cell c-01: ZeroDivisionError")
         assert failed[1].startswith("FAILED variant 12, d-fos: no master")
-        rows = [line.split() for line in result.output.splitlines() if line.startswith(f"out{workers}/")]
+        rows = [
+            line.split() for line in result.output.splitlines() if line.startswith(f"out{workers}/")
+        ]
         assert rows == [[f"out{workers}/{name}", "1", "0", "2"] for name in ("53", "12")]
     first, second = contents(tmp_path / "out1"), contents(tmp_path / "out2")
     assert first == second
     assert sorted(first) == ["12/b-aof.ipynb", "53/b-aof.ipynb"]
 
-    result = call("exercises", "--variant", "53", "--sets", "b", "--masters", masters, "--out", "out2", "--jobs", "1")
+    result = call(
+        "exercises",
+        "--variant",
+        "53",
+        "--sets",
+        "b",
+        "--masters",
+        masters,
+        "--out",
+        "out2",
+        "--jobs",
+        "1",
+    )
     assert result.exit_code == 0
     assert ["out2/53", "0", "1", "0"] in [line.split() for line in result.output.splitlines()]
 
 
-def test_a_variant_that_is_no_model_is_told_at_the_end_and_the_others_are_made(call, masters, no_kernel, tmp_path):
+def test_a_variant_that_is_no_model_is_told_at_the_end_and_the_others_are_made(
+    call, masters, no_kernel, tmp_path
+):
     (tmp_path / "my.toml").write_text(
         "".join(
-            f'[variants.{name}]\nstate = "{state}"\nmeter = "x + w"\n' for name, state in (("good", "x + v"), ("bad", "x + z"))
+            f'[variants.{name}]\nstate = "{state}"\nmeter = "x + w"\n'
+            for name, state in (("good", "x + v"), ("bad", "x + z"))
         ),
         encoding="utf-8",
     )
-    options = ("--all", "--variants", "my.toml", "--sets", "b", "--masters", masters, "--out", "out", "--jobs", "1")
+    options = (
+        "--all",
+        "--variants",
+        "my.toml",
+        "--sets",
+        "b",
+        "--masters",
+        masters,
+        "--out",
+        "out",
+        "--jobs",
+        "1",
+    )
     result = call("exercises", *options)
     assert result.exit_code == 1
     (line,) = [line for line in result.output.splitlines() if line.startswith("FAILED")]
@@ -406,7 +510,9 @@ except KeyboardInterrupt:
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to another process")
 def test_ctrl_c_ends_the_command_and_not_a_kernel_alone():
     """Otherwise the notebook fails, and the next ones are made."""
-    done = subprocess.run([sys.executable, "-c", STOPPED], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", STOPPED], capture_output=True, text=True, timeout=120
+    )
     assert done.stdout == "interrupted\n", done.stderr
 
 
@@ -424,28 +530,54 @@ def test_a_killed_worker_is_told():
 def test_unknown_names_are_refused(call, tmp_path):
     refused(call("exercises", "--out", "o"), "name the variants: --variant 53, or --all")
     refused(call("exercises", "--out", "o", "--variant", "99"), "no variant '99'; there are 53, 1,")
-    refused(call("solutions", "--out", "o", "--variant", "53", "--sets", "b,zz"), "no exercise set zz; there are a, b")
+    refused(
+        call("solutions", "--out", "o", "--variant", "53", "--sets", "b,zz"),
+        "no exercise set zz; there are a, b",
+    )
     refused(call("solutions", "--out", "o", "--variant", "53", "--sets", ","), "no exercise set")
-    refused(call("exercises", "--out", "o", "--variant", "53", "--variants", "no.toml"), "no file of variants at no.toml")
+    refused(
+        call("exercises", "--out", "o", "--variant", "53", "--variants", "no.toml"),
+        "no file of variants at no.toml",
+    )
     refused(call("exercises", "--out", "o", "--students", "no.csv"), "no course list no.csv")
-    refused(call("exercises", "--out", "o", "--students", "no.csv", "--nbgrader"), "the same notebooks to all students")
+    refused(
+        call("exercises", "--out", "o", "--students", "no.csv", "--nbgrader"),
+        "the same notebooks to all students",
+    )
     assert not (tmp_path / "o").exists()
 
 
 def test_two_notebooks_never_share_a_file(call, tmp_path):
     (tmp_path / "list.csv").write_text("name,group\nИванов И.,1\nИванов И,1\n", encoding="utf-8")
-    refused(call("exercises", "--out", "o", "--students", "list.csv", "--sets", "b"), "line 3", "Иванов-И", "in line 2")
-    (tmp_path / "my.toml").write_text(
-        "".join(f'[variants."{name}"]\nstate = "x + v"\nmeter = "x + w"\n' for name in ("A/b", "a-B")), encoding="utf-8"
+    refused(
+        call("exercises", "--out", "o", "--students", "list.csv", "--sets", "b"),
+        "line 3",
+        "Иванов-И",
+        "in line 2",
     )
-    refused(call("exercises", "--out", "o", "--all", "--variants", "my.toml", "--sets", "b"), "two notebooks would be")
+    (tmp_path / "my.toml").write_text(
+        "".join(
+            f'[variants."{name}"]\nstate = "x + v"\nmeter = "x + w"\n' for name in ("A/b", "a-B")
+        ),
+        encoding="utf-8",
+    )
+    refused(
+        call("exercises", "--out", "o", "--all", "--variants", "my.toml", "--sets", "b"),
+        "two notebooks would be",
+    )
     assert not (tmp_path / "o").exists()
 
 
 def test_a_course_list_makes_a_folder_for_each_student(call, tmp_path, masters, monkeypatch):
-    monkeypatch.setattr(handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
-    (tmp_path / "list.csv").write_text("name;group\nИванов Иван;М-1\n../../evil;M\n", encoding="utf-8-sig")
-    result = call("exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters)
+    monkeypatch.setattr(
+        handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work]
+    )
+    (tmp_path / "list.csv").write_text(
+        "name;group\nИванов Иван;М-1\n../../evil;M\n", encoding="utf-8-sig"
+    )
+    result = call(
+        "exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters
+    )
     assert result.exit_code == 0
     folders = [line.split()[0] for line in result.output.splitlines() if line.startswith("o/")]
     assert folders == ["o/М-1/Иванов-Иван", "o/M/evil"]
@@ -486,14 +618,22 @@ def test_variants_differ_within_a_group_until_all_are_taken(tmp_path):
 
 def test_assignment_does_not_follow_the_order_of_the_variants(tmp_path):
     """Otherwise the first in every group would have the same."""
-    firsts = {assign(course_list(tmp_path, f"name,group\nA,{i}\n"), VARIANTS)[0].variant for i in range(30)}
+    firsts = {
+        assign(course_list(tmp_path, f"name,group\nA,{i}\n"), VARIANTS)[0].variant
+        for i in range(30)
+    }
     assert firsts == set(VARIANTS)
 
 
 @pytest.mark.parametrize("separator", [",", ";"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
 def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
-    text = separator.join((" Group ", "No", "NAME")) + "\r\n" + separator.join(("М-1", "1", '"Иванов, Иван"')) + "\r\n\r\n"
+    text = (
+        separator.join((" Group ", "No", "NAME"))
+        + "\r\n"
+        + separator.join(("М-1", "1", '"Иванов, Иван"'))
+        + "\r\n\r\n"
+    )
     (one,) = assign(course_list(tmp_path, text, encoding), VARIANTS)
     assert (one.name, one.group) == ("Иванов, Иван", "М-1")
 
@@ -508,9 +648,18 @@ def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
         ("name,group\n", "names no student"),
         ("name,group\nA,1\n,1\n", "line 3: a student without a name"),
         ("name,group\nA,1\nB,1\nA,1\n", "line 4: A, 1 stands there twice"),
-        ("name,group\nA,1\na,1\n", "line 3: the folder of a, 1 would be 1/a, as that of A, 1 in line 2"),
-        ("name,group\nИванов,1\nИванов\u0438\u0306,1\nИвановй,1\n", "line 4: the folder of Ивановй, 1"),
-        ('name,group\n"A,1\nB,1\n', "line 2: unexpected end of data; is a quote opened and not closed?"),
+        (
+            "name,group\nA,1\na,1\n",
+            "line 3: the folder of a, 1 would be 1/a, as that of A, 1 in line 2",
+        ),
+        (
+            "name,group\nИванов,1\nИванов\u0438\u0306,1\nИвановй,1\n",
+            "line 4: the folder of Ивановй, 1",
+        ),
+        (
+            'name,group\n"A,1\nB,1\n',
+            "line 2: unexpected end of data; is a quote opened and not closed?",
+        ),
         ('name,group\n"A,1\nB",1\nC,1\n', "line 2: a quote is opened and not closed on the line"),
         ('name,group\nA,1\n"B" b,1\n', "line 3: ',' expected after '\"'; is a quote"),
         ("name,group\nA\nB,1\n", "line 2: A without a group"),

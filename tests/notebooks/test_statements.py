@@ -1,4 +1,5 @@
-"""Statements: a task and a hint for every question, and answers to the questions in words that hold for the variant at hand."""
+"""Statements: a task and a hint for every question, and answers to the questions in words that hold
+for the variant at hand."""
 
 import re
 
@@ -28,13 +29,18 @@ ANSWERED = {
     "p": 1,
     "r": 1,
 }  # questions in words
-SAID = re.compile(r"\*(What to expect|Why never negative|When is there an answer\?|What is left out)\.?\*|It goes to \$\\beta\$")
+SAID = re.compile(
+    r"\*(What to expect|Why never negative|When is there an answer\?|What is left out)\.?\*|It "
+    r"goes to \$\\beta\$"
+)
 
 
 def questions():
     for letter in sets():
         parts = re.split(r'\[= heading\("(\w+)".*', read(letter))
-        yield from zip(parts[1::2], (body.partition("[= check(")[0] for body in parts[2::2]), strict=True)
+        yield from zip(
+            parts[1::2], (body.partition("[= check(")[0] for body in parts[2::2]), strict=True
+        )
 
 
 @pytest.mark.quick
@@ -46,19 +52,35 @@ def test_every_question_has_a_task_and_a_hint(name, body):
     assert hints, f"{name} has no hint"
 
 
-@pytest.mark.parametrize(("letter", "variant"), [(letter, "5") for letter in sets()] + [("a", "53"), ("a", "1"), ("g", "20")])
+@pytest.mark.parametrize(
+    ("letter", "variant"),
+    [(letter, "5") for letter in sets()] + [("a", "53"), ("a", "1"), ("g", "20")],
+)
 def test_answers_in_words_are_the_solutions_only(letter, variant):
     """They run to the end, and no student gets one of them, nor a stub in its place."""
     whole = render(read(letter), exercise(letter, variant))
     done = execute_inside(solution(whole))
     assert [one for one in results(done) if one["status"] != "passed"] == []
-    assert [output for cell in done.cells for output in cell.get("outputs", []) if output.output_type == "error"] == []
-    assert len(SAID.findall("\n".join(cell.source for cell in solution(whole).cells))) == ANSWERED[letter]
+    assert [
+        output
+        for cell in done.cells
+        for output in cell.get("outputs", [])
+        if output.output_type == "error"
+    ] == []
+    assert (
+        len(SAID.findall("\n".join(cell.source for cell in solution(whole).cells)))
+        == ANSWERED[letter]
+    )
     handed_out = student(whole, {})
-    assert not [cell.source for cell in handed_out.cells if SAID.search(cell.source) or "SOLUTION" in cell.source]
+    assert not [
+        cell.source
+        for cell in handed_out.cells
+        if SAID.search(cell.source) or "SOLUTION" in cell.source
+    ]
     stubs = [cell for cell in handed_out.cells if STUB in cell.source]
     assert all(cell.source.startswith("def ") for cell in stubs)
-    assert len(stubs) == len(sets()[letter].questions) + (letter == "e")  # question 6 of set e has one, too
+    # question 6 of set e has one, too
+    assert len(stubs) == len(sets()[letter].questions) + (letter == "e")
 
 
 @pytest.mark.parametrize(("variant", "first"), [("53", 1), ("5", 0), ("20", 0), ("12", 0)])

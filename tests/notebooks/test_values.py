@@ -58,7 +58,9 @@ def test_arrays(kind, shape):
         assert type(sent(array[()])) is type(array[()])
     assert (
         sent(array[..., ::-1] if shape else array).tobytes()
-        == np.ascontiguousarray(array[..., ::-1] if shape else array).astype(array.dtype.newbyteorder("=")).tobytes()
+        == np.ascontiguousarray(array[..., ::-1] if shape else array)
+        .astype(array.dtype.newbyteorder("="))
+        .tobytes()
     )
 
 
@@ -107,15 +109,47 @@ def formula(text):
 
 
 STRANGE = [
-    {}, [], ["list"], ["list", 3], ["array", "AAAA"], ["array", "???"], ["int", "1"*5000 + "g"], ["int", "__"],
-    ["complex", "1", 2], ["formulas", 2, 2, []], ["function", 0], ["objects", [2], [1]], ["exec", "1"], [["list"]],
-    *map(formula, (
-        "", "x", "1", "Lambda(Symbol('x'), Symbol('x'))", "__import__('os')", "Function('f')(Symbol('x'))", "sympify('1')",
-        "Symbol('x').free_symbols", "Symbol('x', real=open('f'))", "Symbol(Symbol)", "Integer(1 << 99)", "S.One",
-        "Float('1', precision=open('f'))", "Add(*[1])", "Add(Symbol('x'), evaluate=False)", "(lambda: 1)()", "-pi", "f'{1}'",
-        "Add(" * 300 + "pi" + ")" * 300, "Symbol('x')if 1 else pi", "[pi for x in (1,)]",
-    )),
-]  # fmt: skip
+    {},
+    [],
+    ["list"],
+    ["list", 3],
+    ["array", "AAAA"],
+    ["array", "???"],
+    ["int", "1" * 5000 + "g"],
+    ["int", "__"],
+    ["complex", "1", 2],
+    ["formulas", 2, 2, []],
+    ["function", 0],
+    ["objects", [2], [1]],
+    ["exec", "1"],
+    [["list"]],
+    *map(
+        formula,
+        (
+            "",
+            "x",
+            "1",
+            "Lambda(Symbol('x'), Symbol('x'))",
+            "__import__('os')",
+            "Function('f')(Symbol('x'))",
+            "sympify('1')",
+            "Symbol('x').free_symbols",
+            "Symbol('x', real=open('f'))",
+            "Symbol(Symbol)",
+            "Integer(1 << 99)",
+            "S.One",
+            "Float('1', precision=open('f'))",
+            "Add(*[1])",
+            "Add(Symbol('x'), evaluate=False)",
+            "(lambda: 1)()",
+            "-pi",
+            "f'{1}'",
+            "Add(" * 300 + "pi" + ")" * 300,
+            "Symbol('x')if 1 else pi",
+            "[pi for x in (1,)]",
+        ),
+    ),
+]
 
 
 def test_an_array_of_objects_is_not_unpickled():
@@ -150,13 +184,17 @@ def test_arguments_of_all_questions_can_be_sent():
 
 
 def test_the_grader_asks_with_numbers_of_its_own():
-    """Every question that has numbers or functions among its arguments; formulas in fixed symbols hide nothing."""
+    """Every question that has numbers or functions among its arguments; formulas in fixed symbols
+    hide nothing."""
     asked = 0
     for letter, one in sets().items():
         task = exercise(letter, "53")
         salted = Exercise(letter, task.variant, "salt")
         for question in one.questions:
-            seen, hidden = (json.dumps([encode(tuple(values)) for values in question.arguments(each)]) for each in (task, salted))
+            seen, hidden = (
+                json.dumps([encode(tuple(values)) for values in question.arguments(each)])
+                for each in (task, salted)
+            )
             if any(word in seen for word in ("array", "function", ".")):
                 asked += 1
                 assert seen != hidden or "function" in seen, question.name
@@ -164,7 +202,8 @@ def test_the_grader_asks_with_numbers_of_its_own():
 
 
 def test_the_grader_asks_nothing_that_rounding_decides():
-    """An information matrix with a condition of 1e8: a right answer that rounds in another order is off by 1e-8."""
+    """An information matrix with a condition of 1e8: a right answer that rounds in another order is
+    off by 1e-8."""
     bad = Exercise("g", exercise("g", "20").variant, "salt1")
     question = bad.questions["g7"]
     W, H, D_n = question.arguments(bad)[0]
@@ -179,7 +218,9 @@ def test_the_grader_asks_nothing_that_rounding_decides():
 def test_all_questions_can_be_asked_with_the_first_arguments_that_are_good():
     for letter, one in sets().items():
         for question in one.questions:
-            assert salted(letter, '"53"', question.name, "salt").salt.startswith("salt/"), question.name
+            assert salted(letter, '"53"', question.name, "salt").salt.startswith("salt/"), (
+                question.name
+            )
 
 
 # -- messages
@@ -198,7 +239,13 @@ def test_messages():
     for data in (b"", b"\0\0", frame(b'{"a": 1}')[:-1]):
         with pytest.raises(Closed):
             channel(data).receive()
-    for data in (struct.pack(">Q", 2**40), frame(b"[1]"), frame(b"{"), frame(b"[" * 100_000), frame(b"\xff")):
+    for data in (
+        struct.pack(">Q", 2**40),
+        frame(b"[1]"),
+        frame(b"{"),
+        frame(b"[" * 100_000),
+        frame(b"\xff"),
+    ):
         with pytest.raises(ProtocolError):
             channel(data).receive()
     sink = io.BytesIO()

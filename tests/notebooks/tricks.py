@@ -1,9 +1,13 @@
 """Hostile notebooks: what a student could try to be marked better than the answers deserve.
 
-Each stands before two wrong answers, b1 and b2 of the tiny set; the last function of a trick may take the place of b1's.
+Each stands before two wrong answers, b1 and b2 of the tiny set; the last function of a trick may
+take the place of b1's.
 """
 
-PASSED = "{'application/vnd.kfcourse.check+json': {'question': %r, 'status': 'passed', 'diagnosis': [], 'message': 'right'}}"
+PASSED = (
+    "{'application/vnd.kfcourse.check+json': {'question': %r, 'status': 'passed', "
+    "'diagnosis': [], 'message': 'right'}}"
+)
 B1, B2 = PASSED % "b1", PASSED % "b2"
 
 # -- cells: all of them can stand in one notebook
@@ -249,7 +253,8 @@ def gain(Psi, G, F):
 
 READS = ("the key's file", "the statement's solution")
 
-# -- cells that turn against processes, files and the network: what is to come of them depends on the sandbox
+# -- cells that turn against processes, files and the network: what is to come of them depends on
+# the sandbox
 
 PROCESSES = {
     "kills its parent": "import os\nos.kill(os.getppid(), 9)",
@@ -284,5 +289,6 @@ import time; time.sleep(0.5)
 ''',
     "reads another notebook": "other = open({OTHER!r}).read()\nassert False, 'has read it'",
     "writes outside": "open({OUTSIDE!r}, 'w').write('x')\nassert False, 'has written it'",
-    "uses the network": "import socket\nsocket.create_connection(('127.0.0.1', {PORT}), 2)\nassert False, 'has connected'",
+    "uses the network": "import socket\nsocket.create_connection(('127.0.0.1', {PORT}), "
+    "2)\nassert False, 'has connected'",
 }

@@ -1,4 +1,5 @@
-"""What a page computes in the reader's browser is what the package computes: filters, the exact filter, statistics."""
+"""What a page computes in the reader's browser is what the package computes: filters, the exact
+filter, statistics."""
 
 from __future__ import annotations
 
@@ -18,8 +19,15 @@ from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.pages import browser as printed
 from kfcourse.symbolic.equations import compile_model
 
-SCALAR = {name: variant.model for name, variant in load_variants().items() if variant.model.n == 1 == variant.model.p}
-SETTINGS = "const model = kfModels[id], settings = { values: { ...model.parameters }, prior: model.prior };"
+SCALAR = {
+    name: variant.model
+    for name, variant in load_variants().items()
+    if variant.model.n == 1 == variant.model.p
+}
+SETTINGS = (
+    "const model = kfModels[id], settings = { values: { ...model.parameters }, prior: "
+    "model.prior };"
+)
 RUNS, STEPS = 400, 30
 
 
@@ -35,11 +43,16 @@ def page(browser):
 
 
 def computed(page, body: str, given: dict):
-    """What a function of `given`'s entries returns; as text, for Playwright is slow with long arrays, and JSON has no NaN."""
+    """What a function of `given`'s entries returns; as text, for Playwright is slow with long
+    arrays, and JSON has no NaN."""
     names = ", ".join(given)
-    plain = "(_, v) => v instanceof Float64Array ? [...v].map(String) : typeof v === 'number' ? String(v) : v"
+    plain = (
+        "(_, v) => v instanceof Float64Array ? [...v].map(String) : typeof v === 'number' ? "
+        "String(v) : v"
+    )
     text = page.evaluate(
-        f"text => {{ const f = ({{ {names} }}) => {{ {body} }}; return JSON.stringify(f(JSON.parse(text)), {plain}); }}",
+        f"text => {{ const f = ({{ {names} }}) => {{ {body} }}; return "
+        f"JSON.stringify(f(JSON.parse(text)), {plain}); }}",
         json.dumps(given),
     )
     return json.loads(text)
@@ -54,13 +67,17 @@ def array(values) -> np.ndarray:
 
 @cache
 def ensembles(id: str, **parameters: float) -> list[dict[str, np.ndarray]]:
-    """Standard normal draws of two ensembles, the one for designing and the one for running; and their trajectories."""
+    """Standard normal draws of two ensembles, the one for designing and the one for running; and
+    their trajectories."""
     model, rng = SCALAR[id].replace(**parameters), np.random.default_rng(24)
     state, meter = compile_model(model)
     found = []
     for _ in range(2):
         start = rng.standard_normal(RUNS)
-        v, w = rng.standard_normal((STEPS, RUNS, len(model.v))), rng.standard_normal((STEPS, RUNS, len(model.w)))
+        v, w = (
+            rng.standard_normal((STEPS, RUNS, len(model.v))),
+            rng.standard_normal((STEPS, RUNS, len(model.w))),
+        )
         x = [(model.prior.mean[0] + np.sqrt(model.prior.cov[0, 0]) * start)[:, None]]
         for k in range(STEPS):
             x.append(state(x[-1], v[k]))
@@ -77,7 +94,9 @@ def shipped(one: dict[str, np.ndarray]) -> dict:
 def of_package(model: Model, name: str, designing, running) -> np.ndarray:
     """D_k of a filter of the package, on the trajectories given."""
     (one,) = lab_filters(model, [name])
-    instants = [Instant(designing["x"][k], designing["y"][k], designing["x"][k + 1]) for k in range(STEPS)]
+    instants = [
+        Instant(designing["x"][k], designing["y"][k], designing["x"][k + 1]) for k in range(STEPS)
+    ]
     if hasattr(one, "with_coefficients"):
         (one,) = design([one], instants)
     z = run(one, running["y"]).mean
@@ -94,30 +113,39 @@ def compared(page, id: str, designing, running, changed: dict | None = None) -> 
         return Object.fromEntries(Object.keys(found).map(name => [name,
             tracks.y.map((_, k) => kfLab.errorVariance(tracks.n, tracks.x[k], found[name].z[k]))]));"""
     )
-    given = {"id": id, "designing": shipped(designing), "running": shipped(running), "changed": changed or {}}
+    given = {
+        "id": id,
+        "designing": shipped(designing),
+        "running": shipped(running),
+        "changed": changed or {},
+    }
     return computed(page, body, given)
 
 
 @pytest.mark.parametrize("id", SCALAR)
 def test_the_same_draws_give_the_same_error_variances(page, id):
-    """The package's D_k to 1e-9, from the draws alone: rounding of 1e-16, which thirty steps of a filter and the division by
-    small variances carry to 1e-12 and more."""
+    """The package's D_k to 1e-9, from the draws alone: rounding of 1e-16, which thirty steps of a
+    filter and the division by small variances carry to 1e-12 and more."""
     designing, running = ensembles(id)
     found = compared(page, id, designing, running)
     assert tuple(found) == LAB
     for name in LAB:
         value, error = array(found[name]).T
-        np.testing.assert_allclose(value, of_package(SCALAR[id], name, designing, running), rtol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            value, of_package(SCALAR[id], name, designing, running), rtol=1e-9, err_msg=name
+        )
         assert (error > 0).all()
 
 
-# ---------------------------------------------------------------- the exact filter, and what is said of the bound
+# ---------------------------------------------------------------- the exact filter, and what is
+# said of the bound
 
 
 @pytest.mark.parametrize("id", SCALAR)
 def test_the_exact_filter_is_the_package_s(page, id):
-    """Means within a hundredth of the posterior deviation and variances within 3 %, at the worst of steps; on average the means
-    add 1e-5 to the bound and the variances 1e-3: a tenth of a percent, far below what some hundred trajectories can tell."""
+    """Means within a hundredth of the posterior deviation and variances within 3 %, at the worst of
+    steps; on average the means add 1e-5 to the bound and the variances 1e-3: a tenth of a percent,
+    far below what some hundred trajectories can tell."""
     model, rng, runs, steps = SCALAR[id], np.random.default_rng(5), 16, 12
     state, meter = compile_model(model)
     start = rng.standard_normal(runs) * np.tile([1, 2], runs // 2)
@@ -125,7 +153,11 @@ def test_the_exact_filter_is_the_package_s(page, id):
     for _ in range(steps):
         y.append(meter(x, rng.standard_normal((runs, len(model.w)))))
         x = state(x, rng.standard_normal((runs, len(model.v))))
-    body = SETTINGS + "return y.map(one => { const { z, p } = kfLab.exact(model, settings, one); return [z, p]; });"
+    body = (
+        SETTINGS
+        + "return y.map(one => { const { z, p } = kfLab.exact(model, settings, one); return [z, "
+        "p]; });"
+    )
     found = array(computed(page, body, {"id": id, "y": np.stack(y)[..., 0].T.tolist()}))
     law = run(pointmass(model), np.stack(y))
     mean, variance = law.mean[..., 0].T, law.cov[..., 0, 0].T
@@ -157,18 +189,26 @@ COVERAGE = (
 def test_intervals_above_the_bound_cover(page, id):
     """95 % intervals of forty sets of draws, against the package's gap from many more trajectories.
 
-    Over two filters and three steps together, which depend on each other: within three standard errors of forty independent ones,
-    0.95 - 3 sqrt(0.95 0.05 / 40) = 0.85.  The draws of the page are its own, so this compares these, too.
+    Over two filters and three steps together, which depend on each other: within three standard
+    errors of forty independent ones, 0.95 - 3 sqrt(0.95 0.05 / 40) = 0.85.  The draws of the page
+    are its own, so this compares these, too.
     """
     model = SCALAR[id]
     result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1)
-    found = np.array([array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)])
+    found = np.array(
+        [array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)]
+    )
     ratio, error, bound = np.moveaxis(found, -1, 0)
     gaps = [result.gap(name) for name in ("aof-linearised", "aof-gaussian")]
-    value, own = (np.array([getattr(gap, part) for gap in gaps]) for part in ("value", "standard_error"))
+    value, own = (
+        np.array([getattr(gap, part) for gap in gaps]) for part in ("value", "standard_error")
+    )
     assert (np.abs(ratio - value) < 1.96 * np.hypot(error, own)).mean() > 0.85
-    # and their mean is the package's value, within four standard errors of forty: no bias that the bands would not show
-    assert (np.abs(ratio.mean(axis=0) - value) < 4 * np.hypot(ratio.std(axis=0) / np.sqrt(40), own)).all()
+    # and their mean is the package's value, within four standard errors of forty: no bias that the
+    # bands would not show
+    assert (
+        np.abs(ratio.mean(axis=0) - value) < 4 * np.hypot(ratio.std(axis=0) / np.sqrt(40), own)
+    ).all()
     expected = result.bound()
     spread = np.hypot(bound.std(axis=0) / np.sqrt(40), expected.standard_error)
     assert (np.abs(bound.mean(axis=0) - expected.value) < 4 * spread).all()

@@ -52,7 +52,15 @@ def test_a_book_of_which_nothing_has_changed_stays(tree, capsys):
 
 
 @pytest.mark.parametrize(
-    "name", ["_config.yml", "requirements.txt", "book/a.md", "book/new.md", "exercises/b/keys.py", "kfcourse/c.py"]
+    "name",
+    [
+        "_config.yml",
+        "requirements.txt",
+        "book/a.md",
+        "book/new.md",
+        "exercises/b/keys.py",
+        "kfcourse/c.py",
+    ],
 )
 def test_another_one_is_built_anew_and_counts_as_built_at_its_end_only(tree, name):
     (tree / name).write_text("changed", encoding="utf-8")

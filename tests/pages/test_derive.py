@@ -1,4 +1,5 @@
-"""The page "Derive it" in a real browser: its verdicts are the checker's, and it works by keyboard, without a network."""
+"""The page "Derive it" in a real browser: its verdicts are the checker's, and it works by keyboard,
+without a network."""
 
 from __future__ import annotations
 
@@ -27,14 +28,17 @@ BY_HAND = [
     "variant 53\nlinearised\nF = g^2*d + f^2*m^4\n = G^2*d + f^2*m^2*m^2\n = (g^2 - f^2*m^3*m/d)*d",
     "variant 53\nF = M[(g*x + f*x^2*w - g*m)^2]\n = g^2*M[(x-m)^2]\n = g^2*d",
     "variant 53\nF = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2",
-    "variant 5\nS = M[sin(x)^2]\n = sin(m)^2*exp(-d)\nG = -g*cos(m)*exp(d/2)\nG = g*cos(m)\nG = g*cos(m)*exp(d/2)",
+    "variant 5\nS = M[sin(x)^2]\n = sin(m)^2*exp(-d)\nG = -g*cos(m)*exp(d/2)\nG = g*cos(m)\nG = "
+    "g*cos(m)*exp(d/2)",
     "variant 21\nlinearised\nF11 = cos(m1)^2*d11 + r^2\n = (1 - sin(m1)^2)*d11 + r",
 ]
 
 
 def texts() -> list[str]:
     rng = random.Random(6)
-    made = [one.text(rng) for one in chains(8, COUNT)] + [one.chain.text(rng) for one in planted(9, COUNT)]
+    made = [one.text(rng) for one in chains(8, COUNT)] + [
+        one.chain.text(rng) for one in planted(9, COUNT)
+    ]
     return made + BY_HAND
 
 
@@ -53,18 +57,29 @@ def tab(browser, tmp_path):
 
 
 def test_verdicts_are_those_of_the_checker(tab):
-    """Status, kinds, terms, places and words, on chains made by code and by hand; of what cannot be read, the status."""
+    """Status, kinds, terms, places and words, on chains made by code and by hand; of what cannot be
+    read, the status."""
     every = texts()
     run = """([texts, data]) => { const { models, texts: said } = JSON.parse(data);
         return texts.map((text) => kfcourseDerive.checkText(text, models, said)); }"""
     found = tab.evaluate(run, [every, described(load_variants())])
     for text, theirs in zip(every, found, strict=True):
         ours = checked(text).verdicts
-        assert [(one["line"], one["status"]) for one in theirs] == [(one.line, one.status) for one in ours], text
+        assert [(one["line"], one["status"]) for one in theirs] == [
+            (one.line, one.status) for one in ours
+        ], text
         for one, other in zip(theirs, ours, strict=True):
             if other.status != "unreadable":
-                wanted = [other.says, other.rule, list(other.kinds), list(other.terms), [list(span) for span in other.spans]]
-                assert [one[name] for name in ("says", "rule", "kinds", "terms", "spans")] == wanted, text
+                wanted = [
+                    other.says,
+                    other.rule,
+                    list(other.kinds),
+                    list(other.terms),
+                    [list(span) for span in other.spans],
+                ]
+                assert [
+                    one[name] for name in ("says", "rule", "kinds", "terms", "spans")
+                ] == wanted, text
     assert sum(one.status == "differs" for text in every for one in checked(text).verdicts) > COUNT
 
 
@@ -83,14 +98,21 @@ def test_by_keyboard(tab):
     tab.get_by_label("Your derivation, a step a line").press("Control+Enter")
     assert tab.get_by_role("status").inner_text() == "2 lines, each equal to the one above"
     tab.reload()
-    assert tab.get_by_label("Your derivation, a step a line").input_value() == "h = M[g*x + f*x^2*w]\n = g*m"
+    assert (
+        tab.get_by_label("Your derivation, a step a line").input_value()
+        == "h = M[g*x + f*x^2*w]\n = g*m"
+    )
     tab.get_by_label("Your derivation, a step a line").fill("")
     tab.get_by_label("Model").select_option("5")
-    assert tab.get_by_label("Your derivation, a step a line").input_value() == "h = M[f*w + g*sin(x)]"
+    assert (
+        tab.get_by_label("Your derivation, a step a line").input_value() == "h = M[f*w + g*sin(x)]"
+    )
     assert tab.get_by_role("status").inner_text() == "1 line, each equal to the one above"
     tab.get_by_label("Model").select_option("a model of my own")
     tab.get_by_label("y =").fill("q*x + w")
-    tab.get_by_label("Your derivation, a step a line").fill("F = M[(q*x + w - h)^2]\n = q^2*d + 1\n = <b>")
+    tab.get_by_label("Your derivation, a step a line").fill(
+        "F = M[(q*x + w - h)^2]\n = q^2*d + 1\n = <b>"
+    )
     tab.get_by_role("button", name="Check each line").press("Enter")
     assert [one.get_attribute("class") for one in tab.locator(".kf-derived li").all()] == [
         "kf-right",
@@ -99,7 +121,11 @@ def test_by_keyboard(tab):
     ]
     tab.get_by_label("y =").fill("q**x")
     tab.get_by_role("button", name="Check each line").press("Enter")
-    assert tab.get_by_role("status").inner_text().startswith("y = q**x: an exponent must be a plain number")
+    assert (
+        tab.get_by_role("status")
+        .inner_text()
+        .startswith("y = q**x: an exponent must be a plain number")
+    )
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
 
 

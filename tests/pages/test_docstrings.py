@@ -19,7 +19,8 @@ pytestmark = pytest.mark.quick
         ("K = P H^T F^-1,   z = x^- + K (y - H x^-)", True),
         ("x ~ N(m, d)                 letters of the law that means are over", True),
         ("(z, p)  ->  (lambda, Psi)", True),
-        ("A row is a step.  An empty cell is a missing measurement.", False),  # a quarter of all blocks were such sentences
+        # a quarter of all blocks were such sentences
+        ("A row is a step.  An empty cell is a missing measurement.", False),
         ("Who knows it?  Nobody; what is x_{k+1}:  the next state.", False),
         ("Shapes as of `run`.", False),
     ],
@@ -30,16 +31,28 @@ def test_paragraphs_of_equations_stand_as_they_are_and_sentences_do_not(paragrap
 
 def entries(section, doc):
     """(names, what stands behind the colon) of each entry of a section of a docstring."""
-    found = re.search(rf"^{section}\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", inspect.cleandoc(doc or ""), re.DOTALL | re.MULTILINE)
-    rows = [row.split(" : ", 1) for row in (found[1] if found else "").split("\n") if re.match(r"[\w*`][^:]* : ", row)]
+    found = re.search(
+        rf"^{section}\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)",
+        inspect.cleandoc(doc or ""),
+        re.DOTALL | re.MULTILINE,
+    )
+    rows = [
+        row.split(" : ", 1)
+        for row in (found[1] if found else "").split("\n")
+        if re.match(r"[\w*`][^:]* : ", row)
+    ]
     return [(re.split(r",\s*", names), kind) for names, kind in rows]
 
 
 def documented():
     """Name and value of each class and function of the package."""
-    for module in (importlib.import_module(name) for files in package.folders().values() for name in files):
+    for module in (
+        importlib.import_module(name) for files in package.folders().values() for name in files
+    ):
         for name, one in vars(module).items():
-            if (inspect.isclass(one) or inspect.isfunction(one)) and one.__module__ == module.__name__:
+            if (
+                inspect.isclass(one) or inspect.isfunction(one)
+            ) and one.__module__ == module.__name__:
                 yield f"{module.__name__}.{name}", one
 
 
@@ -52,6 +65,10 @@ def test_behind_the_colon_of_an_entry_stands_its_type_and_no_field_is_left_out()
             rows = entries(section, one.__doc__)
             seen += len(rows)
             wrong += [(name, kind) for _, kind in rows if re.search(r"->|;|\.$", kind)]
-            if rows and section == "Attributes" and (missing := fields - {field for names, _ in rows for field in names}):
+            if (
+                rows
+                and section == "Attributes"
+                and (missing := fields - {field for names, _ in rows for field in names})
+            ):
                 wrong.append((name, f"without {missing}"))
     assert wrong == [] and seen > 200

@@ -1,4 +1,5 @@
-"""Figures that answer, in a real browser: by keyboard, mouse and finger; from a file, offline; still without scripts."""
+"""Figures that answer, in a real browser: by keyboard, mouse and finger; from a file, offline;
+still without scripts."""
 
 from __future__ import annotations
 
@@ -47,7 +48,8 @@ def test_the_lab_is_compared_and_a_link_keeps_it(opened):
     rows = {row.split("\t")[0]: row.split("\t")[1:] for row in first.splitlines()[1:]}
     assert set(rows) == {"GAOF", "LAOF", "DUOF", "GFOS", "LFOS", "GMFOS", "LMFOS"}
     above = {name: float(cells[1].split(" ± ")[0]) for name, cells in rows.items()}
-    assert min(above, key=above.get) == "DUOF" and above["DUOF"] > 0  # what the page tells to look for
+    # what the page tells to look for
+    assert min(above, key=above.get) == "DUOF" and above["DUOF"] > 0
     assert "10,000 trajectories of 30 steps" in tab.get_by_role("status").inner_text()
 
     slider = tab.get_by_role("slider", name="f", exact=True)
@@ -84,7 +86,13 @@ def by_quadrature(measured: float) -> list[float]:
     density = sp.lambdify(x, BEATS[0])(t) * sp.lambdify((x, y), BEATS[1])(t, measured)
     density /= density.sum() * (t[1] - t[0])
     mean = (t * density).sum() * (t[1] - t[0])
-    return [measured, 100 * density[t < 0].sum() * (t[1] - t[0]), mean, np.interp(mean, t, density), density.max()]
+    return [
+        measured,
+        100 * density[t < 0].sum() * (t[1] - t[0]),
+        mean,
+        np.interp(mean, t, density),
+        density.max(),
+    ]
 
 
 def test_the_measurement_is_moved_and_the_posterior_is_bayes(opened):
@@ -95,8 +103,9 @@ def test_the_measurement_is_moved_and_the_posterior_is_bayes(opened):
         for _ in range(times):
             handle.press(key)
         found, place = said(tab), state_of(tab, handle)
-        # printed to 0.01, to a percent and to three digits; the mean's density is read at the nearest of nodes 0.0375 apart,
-        # and changes by 1/sd times its top over a deviation of 0.2: by a tenth of the top at most
+        # printed to 0.01, to a percent and to three digits; the mean's density is read at the
+        # nearest of nodes 0.0375 apart, and changes by 1/sd times its top over a deviation of 0.2:
+        # by a tenth of the top at most
         expected = by_quadrature(float(np.hypot(place, 1)))
         assert found[0] == pytest.approx(expected[0], abs=0.0051)
         assert found[1] == pytest.approx(expected[1], abs=1.0)
@@ -105,13 +114,21 @@ def test_the_measurement_is_moved_and_the_posterior_is_bayes(opened):
         assert found[4] == pytest.approx(expected[4], rel=0.02)
     drag(tab, handle, -60, 0)
     assert said(tab)[0] == pytest.approx(np.hypot(state_of(tab, handle), 1), abs=0.0051)
-    tab.wait_for_function("place => location.hash.endsWith(`place=${place}`)", arg=handle.get_attribute("aria-valuenow"))
+    tab.wait_for_function(
+        "place => location.hash.endsWith(`place=${place}`)",
+        arg=handle.get_attribute("aria-valuenow"),
+    )
     assert said(opened("fig-two-beats", fragment(tab))) == said(tab)
 
 
 def test_a_finger_moves_it_and_does_not_scroll(opened):
-    tab = opened("fig-two-beats", has_touch=True, is_mobile=True, viewport={"width": 390, "height": 500})
-    session, handle = tab.context.new_cdp_session(tab), tab.get_by_role("slider", name="Measured distance")
+    tab = opened(
+        "fig-two-beats", has_touch=True, is_mobile=True, viewport={"width": 390, "height": 500}
+    )
+    session, handle = (
+        tab.context.new_cdp_session(tab),
+        tab.get_by_role("slider", name="Measured distance"),
+    )
     box, before = handle.locator("circle").last.bounding_box(), said(tab)[0]
     at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     for kind, points in [
@@ -119,9 +136,14 @@ def test_a_finger_moves_it_and_does_not_scroll(opened):
         *[("touchMove", [(at[0] + 4 * i, at[1] + i)]) for i in range(10)],
         ("touchEnd", []),
     ]:
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": a, "y": b} for a, b in points]})
+        session.send(
+            "Input.dispatchTouchEvent",
+            {"type": kind, "touchPoints": [{"x": a, "y": b} for a, b in points]},
+        )
     tab.wait_for_function(
-        "before => !document.querySelector('[role=status]').textContent.startsWith(`y = ${before}`)", arg=f"{before:.2f}"
+        "before => !document.querySelector('[role=status]').textContent.startsWith(`y = "
+        "${before}`)",
+        arg=f"{before:.2f}",
     )
     assert said(tab)[0] > before + 0.3
     assert tab.evaluate("scrollY") == 0
@@ -135,14 +157,19 @@ def lines_by_quadrature(mean: float, variance: float) -> list[float]:
     t, weights = np.polynomial.hermite_e.hermegauss(60)
     u, of = np.sqrt(variance) * t, weights / weights.sum()
     signal = np.sin(mean + u)
-    level, slope = np.linalg.lstsq(np.sqrt(of)[:, None] * np.c_[u**0, u], np.sqrt(of) * signal, rcond=None)[0]
+    level, slope = np.linalg.lstsq(
+        np.sqrt(of)[:, None] * np.c_[u**0, u], np.sqrt(of) * signal, rcond=None
+    )[0]
     size = np.sqrt(of @ (signal - level - slope * u) ** 2)
     return [mean, variance, np.sin(mean), np.cos(mean), level, slope, size]
 
 
 def test_the_law_is_moved_and_the_line_is_of_least_squares(opened):
     tab = opened("fig-better-line")
-    mean, variance = tab.get_by_role("slider", name="λ, mean of x"), tab.get_by_role("slider", name="Ψ, variance of x (rad²)")
+    mean, variance = (
+        tab.get_by_role("slider", name="λ, mean of x"),
+        tab.get_by_role("slider", name="Ψ, variance of x (rad²)"),
+    )
     assert said(tab)[:2] == [1, 0.4]
     for moved, key, place in [
         (mean, "ArrowLeft", (0.95, 0.4)),
@@ -155,11 +182,14 @@ def test_the_law_is_moved_and_the_line_is_of_least_squares(opened):
     ]:
         moved.press(key)
         assert (state_of(tab, mean), state_of(tab, variance)) == place
-        np.testing.assert_allclose(said(tab), lines_by_quadrature(*place), rtol=0, atol=0.00051)  # printed to 0.001
+        # printed to 0.001
+        np.testing.assert_allclose(said(tab), lines_by_quadrature(*place), rtol=0, atol=0.00051)
     drag(tab, mean, -150, 40)
     assert 1 < state_of(tab, mean) < 3
     assert said(tab) == pytest.approx(lines_by_quadrature(state_of(tab, mean), 0.02), abs=0.00051)
-    tab.wait_for_function("place => location.hash.includes(`mean=${place}`)", arg=mean.get_attribute("aria-valuenow"))
+    tab.wait_for_function(
+        "place => location.hash.includes(`mean=${place}`)", arg=mean.get_attribute("aria-valuenow")
+    )
     assert said(opened("fig-better-line", fragment(tab))) == said(tab)
 
 
@@ -167,7 +197,8 @@ def test_the_law_is_moved_and_the_line_is_of_least_squares(opened):
 
 
 def gains_and_estimates(lam: float, measured: float, p: float) -> list[float]:
-    """One step of the AOF from the estimate and its variance p before, of the FOS with T, and of the DUOF."""
+    """One step of the AOF from the estimate and its variance p before, of the FOS with T, and of
+    the DUOF."""
     z = lam / 0.9
     found = []
     for spread in (p, 0.001):
@@ -176,12 +207,20 @@ def gains_and_estimates(lam: float, measured: float, p: float) -> list[float]:
         F = Psi + 0.02**2 * ((lam + np.sqrt(Psi) * t) ** 4 @ weights) / weights.sum()
         found.append(Psi / F)
     found.append(0.8)
-    return [lam, measured, *found, *(lam + gain * (measured - lam) + e for gain, e in zip(found, (0, 0, 0.01), strict=True))]
+    return [
+        lam,
+        measured,
+        *found,
+        *(lam + gain * (measured - lam) + e for gain, e in zip(found, (0, 0, 0.01), strict=True)),
+    ]
 
 
 def test_gains_follow_the_prediction_but_the_duofs_does_not(opened):
     tab = opened("fig-lab-gains")
-    lam, measured = tab.get_by_role("slider", name="Prediction λ"), tab.get_by_role("slider", name="Measurement y")
+    lam, measured = (
+        tab.get_by_role("slider", name="Prediction λ"),
+        tab.get_by_role("slider", name="Measurement y"),
+    )
     variance = tab.get_by_role("slider", name="p before, of the GAOF")
     assert said(tab)[:2] == [2, 3]
     for moved, key, place in [
@@ -194,14 +233,21 @@ def test_gains_follow_the_prediction_but_the_duofs_does_not(opened):
     ]:
         before = said(tab)
         moved.press(key)
-        assert said(tab) == pytest.approx(gains_and_estimates(*place), abs=0.00051)  # printed to 0.001
+        # printed to 0.001
+        assert said(tab) == pytest.approx(gains_and_estimates(*place), abs=0.00051)
         assert said(tab)[4] == before[4] == 0.8
         if moved is measured:
             assert said(tab)[2:5] == before[2:5]
     drag(tab, lam, 90, 0)
     assert -2.5 < state_of(tab, lam) < 0
-    assert said(tab) == pytest.approx(gains_and_estimates(state_of(tab, lam), -3.8, 1e-5), abs=0.00051)
+    assert said(tab) == pytest.approx(
+        gains_and_estimates(state_of(tab, lam), -3.8, 1e-5), abs=0.00051
+    )
     drag(tab, measured, 60, 0)
-    assert said(tab) == pytest.approx(gains_and_estimates(state_of(tab, lam), state_of(tab, measured), 1e-5), abs=0.00051)
-    tab.wait_for_function("place => location.hash.includes(`y=${place}`)", arg=measured.get_attribute("aria-valuenow"))
+    assert said(tab) == pytest.approx(
+        gains_and_estimates(state_of(tab, lam), state_of(tab, measured), 1e-5), abs=0.00051
+    )
+    tab.wait_for_function(
+        "place => location.hash.includes(`y=${place}`)", arg=measured.get_attribute("aria-valuenow")
+    )
     assert said(opened("fig-lab-gains", fragment(tab))) == said(tab)

@@ -23,7 +23,12 @@ def test_a_normal_law_gives_back_its_mean_and_variance():
 
 def test_the_integral_is_the_one_sympy_takes():
     exponent = -(x**2) / (2 * D) + a * x + d
-    assert sp.simplify(sp.integrate(sp.exp(exponent), (x, -sp.oo, sp.oo)) / sp.exp(log_integral(exponent, x))) == 1
+    assert (
+        sp.simplify(
+            sp.integrate(sp.exp(exponent), (x, -sp.oo, sp.oo)) / sp.exp(log_integral(exponent, x))
+        )
+        == 1
+    )
 
 
 @pytest.mark.parametrize("exponent", [a * x + d, -(x**4), sp.sin(x)])

@@ -29,7 +29,10 @@ def test_labels_are_in_the_font_of_the_pages_whatever_their_letters(style, caplo
     assert font_manager.findfont("Source Sans 3") in map(str, FONTS)
     figure = Figure()
     ax = figure.subplots()
-    ax.semilogy([1e-3, 1e3], label=r"$\hat x_k$, $\mathsf{M}[\varepsilon^2]/\Psi$, $\mathcal{N}$, $\pm\pi/2$")
+    ax.semilogy(
+        [1e-3, 1e3],
+        label=r"$\hat x_k$, $\mathsf{M}[\varepsilon^2]/\Psi$, $\mathcal{N}$, $\pm\pi/2$",
+    )
     ax.set(title="погрешность ω ≤ −1 °", xlabel=r"$\lambda_k^{(i)}$, с")
     ax.legend()
     with caplog.at_level(logging.WARNING):
@@ -60,9 +63,15 @@ def test_labels_at_the_ends_are_apart_and_in_order() -> None:
         ax.plot([0, 1], [0, end], label=name)
     label_ends(ax, least=0.1, lowest=0)
     labels = [one for one in ax.get_children() if isinstance(one, Legend)]
-    heights = {one.get_texts()[0].get_text(): one.get_bbox_to_anchor().y0 / ax.bbox.height for one in labels}
+    heights = {
+        one.get_texts()[0].get_text(): one.get_bbox_to_anchor().y0 / ax.bbox.height
+        for one in labels
+    }
     heights = {name: height - ax.bbox.y0 / ax.bbox.height for name, height in heights.items()}
     assert list(sorted(heights, key=heights.__getitem__)) == ["low", "middle", "high", "far"]
     assert np.diff(sorted(heights.values())).min() > 0.1 - 1e-9
-    assert heights["low"] >= ax.transAxes.inverted().transform(ax.transData.transform((0, 0)))[1] - 1e-9
+    assert (
+        heights["low"]
+        >= ax.transAxes.inverted().transform(ax.transData.transform((0, 0)))[1] - 1e-9
+    )
     plt.close()

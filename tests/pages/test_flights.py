@@ -32,7 +32,8 @@ def test_the_whole_flight_in_space_and_in_plan(track):
     space, plan = fig.axes
     for axes, found in ((3, [np.transpose(line.get_data_3d()) for line in space.get_lines()]),
                         (2, [line.get_xydata() for line in plan.get_lines()])):  # fmt: skip
-        for drawn, shift in zip(found, (5, 0, 1005, 5), strict=True):  # measurements, truth, filters
+        # measurements, truth, filters
+        for drawn, shift in zip(found, (5, 0, 1005, 5), strict=True):
             np.testing.assert_allclose(drawn, (track.position[:, :axes] + shift) / 1000)
     for number in plan.texts:  # each stands at its own part
         on_part = track.position[track.part == int(number.get_text()), :2] / 1000
@@ -43,10 +44,16 @@ def test_the_whole_flight_in_space_and_in_plan(track):
 def test_pieces_in_plan_are_of_their_parts(track):
     y = track.position[:, None]
     fig = in_plan(track, y, {"Kalman": y + np.array([1000.0, 0, 0])})
-    assert [ax.get_title(loc="left") or ax.get_title() for ax in fig.axes] == ["part 1", "part 2", "part 3", "part 4"]
+    assert [ax.get_title(loc="left") or ax.get_title() for ax in fig.axes] == [
+        "part 1",
+        "part 2",
+        "part 3",
+        "part 4",
+    ]
     for ax, part in zip(fig.axes, (1, 2, 3, 4), strict=True):
         path, estimate = ax.get_lines()[1].get_xydata(), curves(ax)["Kalman"].get_xydata()
-        np.testing.assert_allclose(estimate - path, np.tile([1.0, 0], (len(path), 1)), atol=1e-12)  # km
+        # km
+        np.testing.assert_allclose(estimate - path, np.tile([1.0, 0], (len(path), 1)), atol=1e-12)
         on_part = track.position[track.part == part, :2] / 1000
         assert all(np.abs(on_part - place).sum(axis=1).min() < 1e-12 for place in path)
     plt.close(fig)
@@ -54,7 +61,9 @@ def test_pieces_in_plan_are_of_their_parts(track):
 
 def test_table_by_part(track):
     error = np.stack([0 * track.position + [3.0, 4, 0], 0 * track.position + [3.0, 4, 0]], axis=1)
-    shown = by_part(["one", "two", "three", "four", "five"], {"ours": rms_by_part(error, track.part)})
+    shown = by_part(
+        ["one", "two", "three", "four", "five"], {"ours": rms_by_part(error, track.part)}
+    )
     rows = shown.markdown.splitlines()
     assert rows[0] == "| RMS error (m) | ours |"
     assert rows[-1] == "| five | 5.0 ± 0.0 |"

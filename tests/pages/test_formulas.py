@@ -1,4 +1,5 @@
-"""Formulas are set by the build: what is written of each, and what is said of one that cannot be set."""
+"""Formulas are set by the build: what is written of each, and what is said of one that cannot be
+set."""
 
 from __future__ import annotations
 
@@ -18,7 +19,10 @@ def setter():
 
 def test_a_formula_is_set_for_the_eye_and_said_to_a_screen_reader(setter):
     tree = BeautifulSoup(setter.html(r"\frac{a}{b}<x_{k}", display=False), "html.parser")
-    seen, said = tree.select_one("mjx-math[aria-hidden=true]"), tree.select_one("mjx-assistive-mml > math")
+    seen, said = (
+        tree.select_one("mjx-math[aria-hidden=true]"),
+        tree.select_one("mjx-assistive-mml > math"),
+    )
     assert [one["class"][0] for one in seen.select("mjx-c")] == [
         "mjx-c1D44E",
         "mjx-c1D44F",
@@ -31,8 +35,13 @@ def test_a_formula_is_set_for_the_eye_and_said_to_a_screen_reader(setter):
 
 
 def test_what_is_displayed_is_larger_and_has_a_line_of_its_own(setter):
-    shown, small = (BeautifulSoup(setter.html(r"\frac{a}{b}", display), "html.parser") for display in (True, False))
-    assert shown.select_one("mjx-container[display=true]") and not small.select_one("mjx-container[display=true]")
+    shown, small = (
+        BeautifulSoup(setter.html(r"\frac{a}{b}", display), "html.parser")
+        for display in (True, False)
+    )
+    assert shown.select_one("mjx-container[display=true]") and not small.select_one(
+        "mjx-container[display=true]"
+    )
     assert shown.select_one("mjx-nstrut[type=d]") and small.select_one("mjx-num > [size=s]")
 
 

@@ -1,6 +1,8 @@
-"""The checks of the chapters stop the build: with one sign changed, a chapter fails where it prints the equation.
+"""The checks of the chapters stop the build: with one sign changed, a chapter fails where it prints
+the equation.
 
-Changes in typed relations are planted by book/gate/plant.py; here a few of them, and one in a cell of each chapter.
+Changes in typed relations are planted by book/gate/plant.py; here a few of them, and one in a cell
+of each chapter.
 """
 
 from __future__ import annotations
@@ -32,22 +34,43 @@ ALONE = {
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
     "grid": ("2 * sp.integrate(density * wave", "-2 * sp.integrate(density * wave"),
-    "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
+    "linearisation": (
+        "linear_f, constant_g2 = f + f1 * (before - z)",
+        "linear_f, constant_g2 = f - f1 * (before - z)",
+    ),
     "when-linearisation-fails": ("(M_e, -K_k * S2 * Psi / 2)", "(M_e, K_k * S2 * Psi / 2)"),
-    "better-than-a-tangent": ("second = f + f1 * u + f2 * u**2 / 2", "second = f + f1 * u - f2 * u**2 / 2"),
-    "extended-kalman": ('(s["F"], s["H"] * s["Psi"] * s["H"].T + s["D_n"])', '(s["F"], s["H"] * s["Psi"] * s["H"].T - s["D_n"])'),
+    "better-than-a-tangent": (
+        "second = f + f1 * u + f2 * u**2 / 2",
+        "second = f + f1 * u - f2 * u**2 / 2",
+    ),
+    "extended-kalman": (
+        '(s["F"], s["H"] * s["Psi"] * s["H"].T + s["D_n"])',
+        '(s["F"], s["H"] * s["Psi"] * s["H"].T - s["D_n"])',
+    ),
     "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
     "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
-    "discriminator": ("u = signal.jacobian(phi).T * D_n.inv() * miss", "u = -signal.jacobian(phi).T * D_n.inv() * miss"),
+    "discriminator": (
+        "u = signal.jacobian(phi).T * D_n.inv() * miss",
+        "u = -signal.jacobian(phi).T * D_n.inv() * miss",
+    ),
     "cycle-slips": ("inner = sp.Integral(sp.exp(-V(a))", "inner = sp.Integral(sp.exp(V(a))"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
     "lecture-continuous": ("pull = 2 * N2.inv()", "pull = -2 * N2.inv()"),
-    "structural-functions": ("a.diff(x) ** 2 * p + a.diff(v) ** 2", "a.diff(x) ** 2 * p - a.diff(v) ** 2"),
+    "structural-functions": (
+        "a.diff(x) ** 2 * p + a.diff(v) ** 2",
+        "a.diff(x) ** 2 * p - a.diff(v) ** 2",
+    ),
     "lab-filters": ("Psi - 2 * K * C + K**2 * F", "Psi + 2 * K * C + K**2 * F"),
-    "comparison": ("where={epsilon: x - exact, delta: exact - z}", "where={epsilon: x - exact, delta: exact + z}"),
+    "comparison": (
+        "where={epsilon: x - exact, delta: exact - z}",
+        "where={epsilon: x - exact, delta: exact + z}",
+    ),
     "checking-exact": ("node = center + scale * sp.sinh(t)", "node = center - scale * sp.sinh(t)"),
     "track-2d": ("velocity = v0 + sp.integrate", "velocity = v0 - sp.integrate"),
-    "before-measuring": ("(Lambda, 2 * (1 - rho) ** 2 / rho)", "(Lambda, 2 * (1 + rho) ** 2 / rho)"),
+    "before-measuring": (
+        "(Lambda, 2 * (1 - rho) ** 2 / rho)",
+        "(Lambda, 2 * (1 + rho) ** 2 / rho)",
+    ),
     "numerics": ("return (sp.eye(2) - K * H) * Psi", "return (sp.eye(2) + K * H) * Psi"),
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
     "radar-extended": ("2 * b / (a + 2 * b)),", "2 * b / (a - 2 * b)),"),
@@ -68,7 +91,9 @@ CHANGES = {
 def test_a_changed_sign_stops_the_chapter(chapter: str, monkeypatch: pytest.MonkeyPatch) -> None:
     right, wrong = CHANGES[chapter]
     text = (BOOK / f"{chapter}.md").read_text(encoding="utf-8")
-    assert text.count(right) == 1, "the line to be changed has gone, or is there twice: choose another"
+    assert text.count(right) == 1, (
+        "the line to be changed has gone, or is there twice: choose another"
+    )
     monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
     with pytest.raises(Unverified):
         gate.run(text.replace(right, wrong), wrong, chapter in ALONE)
@@ -76,9 +101,20 @@ def test_a_changed_sign_stops_the_chapter(chapter: str, monkeypatch: pytest.Monk
 
 def test_at_most_one_in_twenty_changes_of_typed_relations_is_not_noticed() -> None:
     chance = random.Random(53)
-    planted = [one for page in sorted(set(BOOK.glob("*.md")) - {gate.MADE}) for one in gate.planted(page, chance, most=5)]
+    planted = [
+        one
+        for page in sorted(set(BOOK.glob("*.md")) - {gate.MADE})
+        for one in gate.planted(page, chance, most=5)
+    ]
     missed = [one for one in planted if not one.noticed]
-    assert {one.where for one in planted} == {"display", "box", "point", "sentence", "side", "name"} and len(planted) > 200
+    assert {one.where for one in planted} == {
+        "display",
+        "box",
+        "point",
+        "sentence",
+        "side",
+        "name",
+    } and len(planted) > 200
     assert len(missed) <= gate.MOST * len(planted), gate.report(missed)
 
 

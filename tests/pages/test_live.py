@@ -1,4 +1,5 @@
-"""The live page in a real browser: its numbers are the package's; it works by mouse, finger and keyboard, without a network."""
+"""The live page in a real browser: its numbers are the package's; it works by mouse, finger and
+keyboard, without a network."""
 
 from __future__ import annotations
 
@@ -23,14 +24,25 @@ RECORDING = live.record(pointer.hand_track(seed=10), seed=6)
 SECONDS = live.GRID * (len(RECORDING.position) - 1)
 INTRODUCED = "300 in 5.99 s"  # of the recorded track, before anything is touched
 START = {"interval": 20, "sigma": 8, "decibels": 57}
-ALONE = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Live</title></head><body>{}</body></html>'
+ALONE = (
+    '<!doctype html><html lang="en"><head><meta '
+    'charset="utf-8"><title>Live</title></head><body>{}</body></html>'
+)
 
 
 def system_of(interval: int, sigma: int, decibels: int):
-    return pointer.uniform_acceleration(interval / 1000, np.sqrt(10 ** (decibels / 10) / (interval / 1000)), sigma)
+    return pointer.uniform_acceleration(
+        interval / 1000, np.sqrt(10 ** (decibels / 10) / (interval / 1000)), sigma
+    )
 
 
-def reference(interval: int, sigma: int, decibels: int, recording: live.Recording = RECORDING, last: float | None = None):
+def reference(
+    interval: int,
+    sigma: int,
+    decibels: int,
+    recording: live.Recording = RECORDING,
+    last: float | None = None,
+):
     """The page's table by the package: of the whole recording, or of its last seconds."""
     truth, y = recording.sampled(interval / 1000, sigma)
     system = system_of(interval, sigma, decibels)
@@ -70,7 +82,9 @@ def test_a_recording_is_the_track_and_its_noise():
 def test_a_page_loads_nothing_and_has_no_ids():
     text = live.page(RECORDING).replace("http://www.w3.org/2000/svg", "")  # a name, not an address
     assert not re.search(r"<[^>]*\b(src|href|srcset)\s*=", text)
-    assert not re.search(r"https?:|import\s*\(|fetch\s*\(|XMLHttpRequest|localStorage|document\.cookie", text)
+    assert not re.search(
+        r"https?:|import\s*\(|fetch\s*\(|XMLHttpRequest|localStorage|document\.cookie", text
+    )
     assert not re.search(r"<[^>]*\sid=", text)  # two pages may stand in one document
     assert live.page(RECORDING) == live.page(RECORDING)
     assert "{{" not in text and "{%" not in text
@@ -80,9 +94,15 @@ def test_a_page_loads_nothing_and_has_no_ids():
     ("call", "message"),
     [
         (lambda: live.page(RECORDING, interval=15), "interval: expected 10, 20, ..., 200, got 15"),
-        (lambda: live.page(RECORDING, decibels=float("nan")), "decibels: expected 30, 31, ..., 80, got nan"),
+        (
+            lambda: live.page(RECORDING, decibels=float("nan")),
+            "decibels: expected 30, 31, ..., 80, got nan",
+        ),
         (lambda: live.page(live.Recording(np.zeros((5, 2)), np.zeros((4, 2)))), "of one shape"),
-        (lambda: live.page(live.Recording(np.full((5, 2), np.nan), np.zeros((5, 2)))), "must be finite"),
+        (
+            lambda: live.page(live.Recording(np.full((5, 2), np.nan), np.zeros((5, 2)))),
+            "must be finite",
+        ),
         (lambda: RECORDING.sampled(0.015, 8.0), "multiple of 0.01 s"),
         (lambda: RECORDING.sampled(0.02, -1.0), "standard deviation"),
     ],
@@ -97,7 +117,8 @@ def test_arguments_that_do_not_fit(call, message):
 
 @contextmanager
 def opening(browser, folder):
-    """open_page(html, **options) -> page of a browser without network; time stands still but for page.clock.run_for(ms)."""
+    """open_page(html, **options) -> page of a browser without network; time stands still but for
+    page.clock.run_for(ms)."""
     with offline(browser) as new_tab:
 
         def open_page(html: str | None = None, real_time: bool = False, **options):
@@ -127,7 +148,10 @@ def script(browser, tmp_path_factory):
 
 
 def shown(tab, column: str = "all") -> dict[str, str]:
-    return {name: tab.locator(f"[data-show={name}-{column}]").inner_text() for name in ("noisy", "filtered", "inside", "nis")}
+    return {
+        name: tab.locator(f"[data-show={name}-{column}]").inner_text()
+        for name in ("noisy", "filtered", "inside", "nis")
+    }
 
 
 def text(tab, name: str) -> str:
@@ -158,11 +182,13 @@ def set_slider(tab, name: str, value: int) -> None:
     assert slider.input_value() == str(value)
 
 
-# ---------------------------------------------------------------- the filter of the page is the filter of the package
+# ---------------------------------------------------------------- the filter of the page is the
+# filter of the package
 
 
 def page_s_run(tab, settings: dict) -> dict:
-    """What the page's filter makes of the recording; as one text, which passes through Playwright faster than its numbers."""
+    """What the page's filter makes of the recording; as one text, which passes through Playwright
+    faster than its numbers."""
     recording = {"position": RECORDING.position.tolist(), "noise": RECORDING.noise.tolist()}
     run = "text => JSON.stringify(kfcourseLive.run(...JSON.parse(text)))"
     return json.loads(tab.evaluate(run, json.dumps([recording, settings])))
@@ -170,11 +196,21 @@ def page_s_run(tab, settings: dict) -> dict:
 
 @pytest.mark.parametrize(
     ("interval", "sigma", "decibels", "switches"),
-    [(20, 8, 57, ()), (200, 1, 80, ()), (100, 8, 57, ("dropouts", "input")), (20, 8, 57, ("outliers", "gate"))],
+    [
+        (20, 8, 57, ()),
+        (200, 1, 80, ()),
+        (100, 8, 57, ("dropouts", "input")),
+        (20, 8, 57, ("outliers", "gate")),
+    ],
 )
 def test_the_filter_of_the_page_is_the_package_s(script, interval, sigma, decibels, switches):
-    """What is lost or refused is a missing measurement to the package's filter; refused is what chi squared calls rare."""
-    settings = {"interval": interval / 1000, "sigma": sigma, "intensity": 10 ** (decibels / 10)} | dict.fromkeys(switches, True)
+    """What is lost or refused is a missing measurement to the package's filter; refused is what chi
+    squared calls rare."""
+    settings = {
+        "interval": interval / 1000,
+        "sigma": sigma,
+        "intensity": 10 ** (decibels / 10),
+    } | dict.fromkeys(switches, True)
     found = page_s_run(script, settings)
     samples, system, dt = found["samples"], system_of(interval, sigma, decibels), interval / 1000
     truth, clean = RECORDING.sampled(dt, sigma)
@@ -183,13 +219,17 @@ def test_the_filter_of_the_page_is_the_package_s(script, interval, sigma, decibe
     y = np.array([one["y"] or [np.nan] * 2 for one in samples])[:, None]
     wild = np.hypot(*(y - clean)[:, 0].T) > 1e-9  # a lost sample is not
     np.testing.assert_allclose(np.hypot(*(y - clean)[wild, 0].T), 15 * sigma, rtol=1e-9)
-    for some, share in ((lost, 0.3 * ("dropouts" in switches)), (wild, 0.05 * ("outliers" in switches))):
+    for some, share in (
+        (lost, 0.3 * ("dropouts" in switches)),
+        (wild, 0.05 * ("outliers" in switches)),
+    ):
         assert abs(some.mean() - share) <= 4 * np.sqrt(share / len(y)) and not some[:3].any()
     kept = np.where(refused[:, None, None], np.nan, y)
     u = np.nan_to_num(pointer.acceleration_from(y, dt)) if "input" in switches else None
     laws = pointer.follow(system, kept, dt, u)
-    # Rounding of 1e-16 in each of some hundred steps, times Psi / R, which is sigma_a^2 Delta^4 / (4 sigma^2) = 2e5 at the worst
-    # of these settings (200 ms, 1 px, 80 dB): there the covariance is a small difference.
+    # Rounding of 1e-16 in each of some hundred steps, times Psi / R, which is sigma_a^2 Delta^4 /
+    # (4 sigma^2) = 2e5 at the worst of these settings (200 ms, 1 px, 80 dB): there the covariance
+    # is a small difference.
     for name, expected in (("law", laws.posterior), ("predicted", laws.predicted)):
         mean, cov = (np.array([one[name][part] for one in samples[3:]]) for part in ("mean", "cov"))
         sd = np.sqrt(np.diagonal(expected.cov[:, 0], axis1=1, axis2=2))
@@ -199,16 +239,26 @@ def test_the_filter_of_the_page_is_the_package_s(script, interval, sigma, decibe
         assert ("gain" in one["law"]) == bool(one["y"]) or one.get("refused")
         if "gain" in one["law"] and not one.get("refused"):
             gain = p @ system.H.T / sigma**2
-            np.testing.assert_allclose(one["law"]["gain"], gain, rtol=0, atol=1e-9 * np.sqrt(np.diag(p)).max() / sigma)
+            np.testing.assert_allclose(
+                one["law"]["gain"], gain, rtol=0, atol=1e-9 * np.sqrt(np.diag(p)).max() / sigma
+            )
     size = nis(innovations(system.measure, laws.predicted, y[3:]))[:, 0]
-    np.testing.assert_array_equal(refused[3:], ("gate" in switches) & (np.nan_to_num(size) > -2 * np.log(0.001)))
+    np.testing.assert_array_equal(
+        refused[3:], ("gate" in switches) & (np.nan_to_num(size) > -2 * np.log(0.001))
+    )
     later = smooth(system, laws).mean[:, 0, :2]
-    np.testing.assert_allclose([one["smoothed"] for one in samples[3:]], later, rtol=1e-8, atol=1e-6)
+    np.testing.assert_allclose(
+        [one["smoothed"] for one in samples[3:]], later, rtol=1e-8, atol=1e-6
+    )
     measures = found["measures"]
-    assert measures["smoothed"] == pytest.approx(np.sqrt(((later - truth[3:]) ** 2).sum(axis=-1).mean()), rel=1e-8)
+    assert measures["smoothed"] == pytest.approx(
+        np.sqrt(((later - truth[3:]) ** 2).sum(axis=-1).mean()), rel=1e-8
+    )
     if not switches:
         for name, value in reference(interval, sigma, decibels).items():
-            assert measures[name] * (100 if name == "inside" else 1) == pytest.approx(value, rel=1e-9)
+            assert measures[name] * (100 if name == "inside" else 1) == pytest.approx(
+                value, rel=1e-9
+            )
 
 
 # ---------------------------------------------------------------- by keyboard
@@ -233,9 +283,13 @@ def test_the_recorded_track_by_keyboard(opened):
     count, seconds = re.fullmatch(r"(\d+) in (\d+\.\d\d) s", text(tab, "count")).groups()
     # frames of 16 ms; the first begins the track
     assert 1.9 < float(seconds) <= 2.0 and int(count) == int(float(seconds) / 0.02 + 1e-9) + 1
-    part = live.Recording(*(values[: round(float(seconds) / live.GRID) + 1] for values in RECORDING))
+    part = live.Recording(
+        *(values[: round(float(seconds) / live.GRID) + 1] for values in RECORDING)
+    )
     assert shown(tab) == written(reference(**START, recording=part))
-    assert status(tab) == "Paused at {} s: noisy {noisy}, filtered {filtered}.".format(seconds, **shown(tab))
+    assert status(tab) == "Paused at {} s: noisy {noisy}, filtered {filtered}.".format(
+        seconds, **shown(tab)
+    )
     tab.clock.run_for(1000)
     assert text(tab, "count") == f"{count} in {seconds} s"
     tab.keyboard.press("Enter")
@@ -243,7 +297,9 @@ def test_the_recorded_track_by_keyboard(opened):
     assert shown(tab) == written(reference(**START))
     assert shown(tab, "recent") == written(reference(**START, last=3.0))
     assert shown(tab, "recent") != shown(tab)
-    assert status(tab) == "End of the recorded track: noisy {noisy}, filtered {filtered}.".format(**shown(tab))
+    assert status(tab) == "End of the recorded track: noisy {noisy}, filtered {filtered}.".format(
+        **shown(tab)
+    )
     assert tab.evaluate(focus) == "Play againBUTTON"
     tab.keyboard.press("Enter")
     tab.clock.run_for(500)
@@ -260,7 +316,9 @@ def test_sliders_filter_the_same_track_anew(opened):
     assert text(tab, "interval") == "100 ms" and text(tab, "sigma") == "9 px"
     assert text(tab, "decibels") == "41 dB, 1.3·10⁴ px²/s³"
     tab.clock.run_for(1000)
-    assert status(tab) == "At {:.2f} s: noisy {noisy}, filtered {filtered}.".format(SECONDS, **shown(tab))
+    assert status(tab) == "At {:.2f} s: noisy {noisy}, filtered {filtered}.".format(
+        SECONDS, **shown(tab)
+    )
     for name, value in (("interval", "100 ms"), ("sigma", "9 px"), ("decibels", "41 decibels")):
         assert tab.locator(f"input[data-set={name}]").get_attribute("aria-valuetext") == value
 
@@ -282,14 +340,21 @@ def test_a_link_keeps_the_settings(opened):
     assert tab.evaluate("location.hash") == "#live?decibels=40&gate=1"
     tab.evaluate("location.hash = '#live?sigma=17&outliers=1&interval=999'")
     tab.wait_for_function("document.querySelector('[data-show=sigma]').textContent === '17 px'")
-    assert tab.locator("input[data-set=outliers]").is_checked() and not tab.locator("input[data-set=gate]").is_checked()
+    assert (
+        tab.locator("input[data-set=outliers]").is_checked()
+        and not tab.locator("input[data-set=gate]").is_checked()
+    )
     assert text(tab, "interval") == "200 ms" and text(tab, "decibels").startswith("57 dB")
 
 
 def test_its_file_is_read_by_the_command(opened, tmp_path, monkeypatch):
     """With the model of the chapter, as it stands there."""
-    chapter = (Path(live.__file__).parents[2] / "book" / "live-track.md").read_text(encoding="utf-8")
-    (tmp_path / "pointer.toml").write_text(re.search(r"```toml\n(.*?)```", chapter, re.DOTALL)[1], encoding="utf-8")
+    chapter = (Path(live.__file__).parents[2] / "book" / "live-track.md").read_text(
+        encoding="utf-8"
+    )
+    (tmp_path / "pointer.toml").write_text(
+        re.search(r"```toml\n(.*?)```", chapter, re.DOTALL)[1], encoding="utf-8"
+    )
     tab = opened()
     play_to_the_end(tab)
     check(tab, "dropouts")
@@ -303,7 +368,9 @@ def test_its_file_is_read_by_the_command(opened, tmp_path, monkeypatch):
     assert 0.25 < np.mean([line.endswith(",,") for line in lines]) < 0.35
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.csv").write_text("\n".join(lines[:200]) + "\n")
-    result = CliRunner().invoke(cli.main, ["estimate", "short.csv", "--model", "pointer.toml", "--out", "out"])
+    result = CliRunner().invoke(
+        cli.main, ["estimate", "short.csv", "--model", "pointer.toml", "--out", "out"]
+    )
     assert result.exit_code == 0, result.output
     assert "199 rows" in result.output and (tmp_path / "out" / "estimate.csv").is_file()
 
@@ -312,7 +379,8 @@ def test_its_file_is_read_by_the_command(opened, tmp_path, monkeypatch):
 
 
 def circle(tab, move, turns: float = 1.5, seconds: float = 3.0, radius: float = 0.3) -> None:
-    """Move along a circle in the middle of the field, at the rate of a screen; `radius` in heights of the field."""
+    """Move along a circle in the middle of the field, at the rate of a screen; `radius` in heights
+    of the field."""
     box = tab.locator("canvas").bounding_box()
     for i in range(round(seconds / 0.016)):
         angle = 2 * np.pi * turns * i * 0.016 / seconds
@@ -331,7 +399,9 @@ def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     tab.mouse.move(5, 5)
     count, seconds = re.fullmatch(r"(\d+) in (\d+\.\d\d) s", text(tab, "count")).groups()
     assert 2.9 < float(seconds) <= 3.0 and int(count) == int(float(seconds) / 0.02 + 1e-9) + 1
-    assert status(tab) == "Your track, {} s: noisy {noisy}, filtered {filtered}.".format(seconds, **shown(tab))
+    assert status(tab) == "Your track, {} s: noisy {noisy}, filtered {filtered}.".format(
+        seconds, **shown(tab)
+    )
     found = {name: float(value.split()[0]) for name, value in shown(tab).items()}
     assert found["filtered"] < found["noisy"]
     tab.clock.run_for(2000)
@@ -345,16 +415,22 @@ def test_a_finger(opened):
     session = tab.context.new_cdp_session(tab)
 
     def touch(kind, *points):
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]})
+        session.send(
+            "Input.dispatchTouchEvent",
+            {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]},
+        )
 
     box = tab.locator("canvas").bounding_box()
     touch("touchStart", (box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2))
     circle(tab, lambda x, y: touch("touchMove", (x, y)), seconds=2.0, turns=1.0)
     assert text(tab, "phase") == "ready"
     touch("touchEnd")
-    assert re.match(r"Your track, (1\.[89]|2\.0)", status(tab)), status(tab)  # the browser has not taken the touch for scrolling
+    # the browser has not taken the touch for scrolling
+    assert re.match(r"Your track, (1\.[89]|2\.0)", status(tab)), status(tab)
     found = {name: float(value.split()[0]) for name, value in shown(tab).items()}
     assert found["filtered"] < found["noisy"]
     assert tab.evaluate("[scrollX, scrollY]") == [0, 0]
-    assert tab.locator("canvas").evaluate("canvas => getComputedStyle(canvas).touchAction") == "none"
+    assert (
+        tab.locator("canvas").evaluate("canvas => getComputedStyle(canvas).touchAction") == "none"
+    )
     assert tab.locator("body").evaluate("body => getComputedStyle(body).touchAction") == "auto"

@@ -1,4 +1,5 @@
-"""Relations are read as TeX prints them, and computed; a changed letter, sign, index or transposition is found."""
+"""Relations are read as TeX prints them, and computed; a changed letter, sign, index or
+transposition is found."""
 
 import numpy as np
 import pytest
@@ -13,9 +14,16 @@ pytestmark = pytest.mark.quick
 RUN = kalman_run(np.random.default_rng(1))
 MASSES = np.array([0.2, 0.3, 0.5])
 CHAIN = {
-    "i": range(3), "j": range(3), r"\mu": Indexed(MASSES), "x": Indexed([1.0, 2.0, 4.0]), "z": 2.8, "p": 1.56, "n": 2,
-    "P": Indexed(np.arange(9.0).reshape(3, 3)), "m": Indexed(np.arange(9.0).reshape(3, 3).T @ MASSES),
-}  # fmt: skip
+    "i": range(3),
+    "j": range(3),
+    r"\mu": Indexed(MASSES),
+    "x": Indexed([1.0, 2.0, 4.0]),
+    "z": 2.8,
+    "p": 1.56,
+    "n": 2,
+    "P": Indexed(np.arange(9.0).reshape(3, 3)),
+    "m": Indexed(np.arange(9.0).reshape(3, 3).T @ MASSES),
+}
 
 
 def test_what_tex_prints_alike_is_alike():
@@ -24,11 +32,16 @@ def test_what_tex_prints_alike_is_alike():
 
 
 def test_a_display_is_taken_apart():
-    display = r"\begin{aligned} a&=f(b,c), & d&=\begin{pmatrix}1&2\\3&4\end{pmatrix},\\ e&\le g\text{ and so on}.\end{aligned}"
+    display = (
+        r"\begin{aligned} a&=f(b,c), & d&=\begin{pmatrix}1&2\\3&4\end{pmatrix},\\ e&\le "
+        r"g\text{ and so on}.\end{aligned}"
+    )
     found = pieces(display)
     assert found[0] == normal("a=f(b,c)")
     assert len(found) == 3 and all(map(is_relation, found))
-    assert not is_relation(normal(r"\sum_{i=1}^n x_i")) and is_relation(normal(r"x\sim\mathcal N(0,1)"))
+    assert not is_relation(normal(r"\sum_{i=1}^n x_i")) and is_relation(
+        normal(r"x\sim\mathcal N(0,1)")
+    )
 
 
 @pytest.mark.parametrize(
@@ -44,7 +57,10 @@ def test_a_display_is_taken_apart():
 )
 def test_relations_of_matrices_hold_and_changed_ones_do_not(right: str):
     holds(right, RUN)
-    wrong = [right.replace(*one, 1) for one in (("^T", ""), ("+", "-"), ("-K", "+K"), ("K_k", "K_{k+1}"), ("=", "=2"))]
+    wrong = [
+        right.replace(*one, 1)
+        for one in (("^T", ""), ("+", "-"), ("-K", "+K"), ("K_k", "K_{k+1}"), ("=", "=2"))
+    ]
     for one in wrong:
         if one != right:
             with pytest.raises((Unverified, Unread)):
@@ -76,11 +92,24 @@ def test_numbers_sums_and_integrals(right: str, wrong: str):
 
 def test_letters_of_any_length_functions_and_what_depends_on_variables():
     letters = {
-        **{r"p(x\mid y)": Of(lambda x, y: x * y, "x", "y"), "x": 2.0, "y": 3.0, r"\frac{\partial S}{\partial x}": 5.0},
-        **{"a": lambda x, v: x + v, "z": 1.0, r"z\leftarrow": 7.0, r"\mathsf M": lambda values: np.mean(values)},
+        **{
+            r"p(x\mid y)": Of(lambda x, y: x * y, "x", "y"),
+            "x": 2.0,
+            "y": 3.0,
+            r"\frac{\partial S}{\partial x}": 5.0,
+        },
+        **{
+            "a": lambda x, v: x + v,
+            "z": 1.0,
+            r"z\leftarrow": 7.0,
+            r"\mathsf M": lambda values: np.mean(values),
+        },
         **{r"\hat x": given(Indexed([1.0, 2.0]), Indexed([3.0, 4.0])), "k": range(1, 2)},
     }
-    right = r"p(x\mid y)=6; \frac{\partial S}{\partial x}x=10; a^2(x,y)=25; z\leftarrow z+2y; \mathsf M(x-y)^2=1"
+    right = (
+        r"p(x\mid y)=6; \frac{\partial S}{\partial x}x=10; a^2(x,y)=25; z\leftarrow z+2y; "
+        r"\mathsf M(x-y)^2=1"
+    )
     for one in (*right.split("; "), r"\hat x_{k\mid k-1}=2", r"\hat x_{k\mid k}=4"):
         holds(one, letters)
     for wrong in (r"p(y\mid x)=6", "S'=1", r"z\leftarrow z+y", r"x\leftarrow 2"):
@@ -90,7 +119,11 @@ def test_letters_of_any_length_functions_and_what_depends_on_variables():
 
 def test_the_extended_run_knows_its_jacobians():
     run = extended_run(np.random.default_rng(2), BENT)
-    for relation in (r"\lambda_{k+1}=f_k(z_k)", r"\Psi_{k+1}=\Phi_kp_k\Phi_k^T+g_kD_\xi g_k^T", r"p_k=(I-K_kH_k)\Psi_k"):
+    for relation in (
+        r"\lambda_{k+1}=f_k(z_k)",
+        r"\Psi_{k+1}=\Phi_kp_k\Phi_k^T+g_kD_\xi g_k^T",
+        r"p_k=(I-K_kH_k)\Psi_k",
+    ):
         holds(relation, run)
     with pytest.raises(Unverified):
         holds(r"\Psi_{k+1}=\Phi_kp_k\Phi_k^T+g_kg_k^T", run)

@@ -1,4 +1,5 @@
-"""Every relation that a page types says what it is; numbers in claims and captions come from their cells."""
+"""Every relation that a page types says what it is; numbers in claims and captions come from their
+cells."""
 
 from __future__ import annotations
 
@@ -6,7 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gate.page import COMPUTED, CONDITION, DEFINITION, Formula, Letters, formulas, judged, letters_of, typed_numbers
+from gate.page import (
+    COMPUTED,
+    CONDITION,
+    DEFINITION,
+    Formula,
+    Letters,
+    formulas,
+    judged,
+    letters_of,
+    typed_numbers,
+)
 
 from kfcourse.pages import Unverified
 
@@ -37,10 +48,18 @@ def test_numbers_of_claims_and_of_captions_of_tables_come_from_their_cells(page:
 
 
 def test_a_changed_number_of_a_claim_or_of_a_caption_is_noticed():
-    code = 'claim(f"To 12 digits, 7 of {n} at $k=2$.", abs(x[7]) < 1e-12)\ntable(c, caption=f"95 % of {n}, in 6,000 boats")'
+    code = (
+        'claim(f"To 12 digits, 7 of {n} at $k=2$.", abs(x[7]) < 1e-12)\ntable(c, caption=f"95 '
+        '% of {n}, in 6,000 boats")'
+    )
     page = f"```{{code-cell}} python\n{code}\nlevel, runs = 0.95, 6000\n```\n"
     assert list(typed_numbers(page)) == []
-    for right, wrong in (("12 digits", "10 digits"), ("7 of", "8 of"), ("95 %", "99 %"), ("6,000 boats", "600 boats")):
+    for right, wrong in (
+        ("12 digits", "10 digits"),
+        ("7 of", "8 of"),
+        ("95 %", "99 %"),
+        ("6,000 boats", "600 boats"),
+    ):
         (number,) = typed_numbers(page.replace(right, wrong))
         assert wrong.startswith(number)
 
@@ -96,14 +115,21 @@ verified((r"\\det A", x, y), names={x: "G^2"}, label="eq-b")
 ```
 """
     assert [tuple(one) for one in formulas(page)] == [
-        ("display", "a=b", "eq-a"), ("display", "e=f", ""), ("box", "c=d", ""), ("sentence", "a=b", ""),
-        ("side", r"\det A", ""), ("name", "G^2", ""),
-    ]  # fmt: skip
+        ("display", "a=b", "eq-a"),
+        ("display", "e=f", ""),
+        ("box", "c=d", ""),
+        ("sentence", "a=b", ""),
+        ("side", r"\det A", ""),
+        ("name", "G^2", ""),
+    ]
 
 
 def test_a_relation_in_a_sentence_holds_if_it_can_be_read():
     page = Letters((letters,), {CONDITION: ["a<b"]})
-    assert [page.judge(Formula("sentence", one))[0].what for one in ("b=2a,", "a<b")] == [COMPUTED, CONDITION]
+    assert [page.judge(Formula("sentence", one))[0].what for one in ("b=2a,", "a<b")] == [
+        COMPUTED,
+        CONDITION,
+    ]
     for unread_one in ("b=2c", "a=1", "b=-a", "x", r"a=\frac12", r"\hat b=c'"):
         assert page.judge(Formula("sentence", unread_one)) == []
     with pytest.raises(Unverified, match="does not hold"):
@@ -111,7 +137,10 @@ def test_a_relation_in_a_sentence_holds_if_it_can_be_read():
 
 
 def test_a_formula_of_the_key_points_is_computed_or_stands_elsewhere(tmp_path):
-    page = "The sum $q=r+s$ and $uv^2$.\n\n```{admonition} Key points\n:class: keypoints\n\n- So $q=r+s$, $uv^2$.\n```\n"
+    page = (
+        "The sum $q=r+s$ and $uv^2$.\n\n```{admonition} Key points\n:class: keypoints\n\n- So "
+        "$q=r+s$, $uv^2$.\n```\n"
+    )
     assert [said for _, said in judged(tmp_path / "page.md", page)] == [[]] * 4
     for wrong in ("$q=r-s$", "$uv$", "$uv^3$"):
         with pytest.raises(Unverified, match="nothing says what this is"):

@@ -1,4 +1,5 @@
-"""Figures of chapters that answer, by keyboard and pointer: their numbers are the package's or NumPy's; a link keeps them."""
+"""Figures of chapters that answer, by keyboard and pointer: their numbers are the package's or
+NumPy's; a link keeps them."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ def link_keeps(opened, tab, name: str, part: str) -> None:
 
 
 def estimates(y1: float, Q: float, R: float) -> tuple[float, float]:
-    """By the package: the estimate at step 1, which has not forgotten the first law, and the half width of its band."""
+    """By the package: the estimate at step 1, which has not forgotten the first law, and the half
+    width of its band."""
     model = Model.define("c*x + e*v", "x + f*w", dict(c=0.9, e=Q**0.5, f=R**0.5))
     y = RECORD[1].copy()
     y[1] = y1
@@ -43,7 +45,10 @@ def estimates(y1: float, Q: float, R: float) -> tuple[float, float]:
 def test_one_measurement_moves_the_estimate_and_not_the_band(opened):
     tab = opened("fig-ten-minutes")
     ring = tab.get_by_role("slider", name="Measurement at step 1")
-    Q, R = tab.get_by_role("slider", name="Q, of the kicks"), tab.get_by_role("slider", name="R, of the meter")
+    Q, R = (
+        tab.get_by_role("slider", name="Q, of the kicks"),
+        tab.get_by_role("slider", name="R, of the meter"),
+    )
 
     def holds(measured, q, r):
         numbers = said(tab)
@@ -77,13 +82,21 @@ def three_tests(q: float, r: float) -> list[float]:
     one = linearised(WALK.replace(e=0.3 * q**0.5, f=r**0.5))
     seen = innovations(one.measure, predictions(aof(one), WALKED.y), WALKED.y)
     size = nis(seen).mean()
-    return [nees(WALKED.x, run(aof(one), WALKED.y)).mean(), size, autocorrelation(seen, 1).value[0] / size]
+    return [
+        nees(WALKED.x, run(aof(one), WALKED.y)).mean(),
+        size,
+        autocorrelation(seen, 1).value[0] / size,
+    ]
 
 
 def test_the_three_tests_are_the_package_s(opened):
     tab = opened("fig-consistency-faults")
-    Q, R = tab.get_by_role("slider", name="Multiply its Q by"), tab.get_by_role("slider", name="Multiply its R by")
-    assert said(tab) == pytest.approx(three_tests(0.1, 1), abs=0.0052)  # printed to 0.01; four digits of the records
+    Q, R = (
+        tab.get_by_role("slider", name="Multiply its Q by"),
+        tab.get_by_role("slider", name="Multiply its R by"),
+    )
+    # printed to 0.01; four digits of the records
+    assert said(tab) == pytest.approx(three_tests(0.1, 1), abs=0.0052)
     Q.press("End")
     assert said(tab) == pytest.approx(three_tests(1, 1), abs=0.0052)  # the cure
     R.press("Home")
@@ -94,7 +107,10 @@ def test_the_three_tests_are_the_package_s(opened):
 @pytest.mark.parametrize("letter", "AC")
 def test_a_hidden_fault_is_guessed(opened, letter):
     tab = opened("fig-consistency-faults")
-    which, guess = tab.get_by_role("combobox", name="Filter"), tab.get_by_role("combobox", name="Which is wrong?")
+    which, guess = (
+        tab.get_by_role("combobox", name="Filter"),
+        tab.get_by_role("combobox", name="Which is wrong?"),
+    )
     right = dict(zip("ABCDE", HIDDEN, strict=True))[letter]
     wrong = next(one for one in FAULTS if one != right)
     which.select_option(letter)
@@ -121,7 +137,10 @@ def trace(sigma: float, draw: int) -> np.ndarray:
 
 def test_the_ball_is_the_loop(opened):
     tab = opened("fig-slips-ball")
-    step, draw = tab.get_by_role("slider", name="Step to look at"), tab.get_by_role("slider", name="Random numbers")
+    step, draw = (
+        tab.get_by_role("slider", name="Step to look at"),
+        tab.get_by_role("slider", name="Random numbers"),
+    )
     noise = tab.get_by_role("slider", name="σ of the meter (V)")
 
     def holds(sigma, which, k):
@@ -201,11 +220,20 @@ def test_the_bars_reorder(opened):
         assert (f"{more} not significantly worse" in status) == (more > 0)
 
     holds(2, 2)
-    for key, place in [("ArrowUp", (2, 3)), ("ArrowRight", (3, 3)), ("Home", (0, 3)), ("ArrowUp", (0, 4)), ("End", (10, 4))]:
+    for key, place in [
+        ("ArrowUp", (2, 3)),
+        ("ArrowRight", (3, 3)),
+        ("Home", (0, 3)),
+        ("ArrowUp", (0, 4)),
+        ("End", (10, 4)),
+    ]:
         ring.press(key)
         holds(*place)
     drag(tab, ring, -100, 60)
-    k, row = int(state_of(tab, ring)), MAP["ratios"].index(float(ring.get_attribute("aria-valuetext").split("= ")[1]))
+    k, row = (
+        int(state_of(tab, ring)),
+        MAP["ratios"].index(float(ring.get_attribute("aria-valuetext").split("= ")[1])),
+    )
     assert k < 9 and row < 4
     holds(k, row)
     link_keeps(opened, tab, "front", f"k={k}")

@@ -11,10 +11,15 @@ pytestmark = pytest.mark.quick
 
 
 def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
-    shown = table({"filter": ["a", "b"], "$D$ (m²)": [1.0, -2.25], "e": [(1.0, 0.125), np.nan]}, ".2f", caption="Errors")
+    shown = table(
+        {"filter": ["a", "b"], "$D$ (m²)": [1.0, -2.25], "e": [(1.0, 0.125), np.nan]},
+        ".2f",
+        caption="Errors",
+    )
     assert shown.markdown == (
         '<span class="kf-caption">Errors</span>\n\n'
-        "| filter | $D$ (m²) | e |\n| :-- | --: | --: |\n| a | 1.00 | 1.00 ± 0.12 |\n| b | −2.25 | – |"
+        "| filter | $D$ (m²) | e |\n| :-- | --: | --: |\n| a | 1.00 | 1.00 ± 0.12 |\n| b | −2.25 "
+        "| – |"
     )
     assert "| +1.0 |" in table({"D": [1.0]}, {"D": "+.1f"}).markdown
     assert "| 12.5\u00a0% |" in table({"D": [0.125]}, ".1%").markdown

@@ -1,4 +1,5 @@
-"""The glossary: each term once, introduced by a page that there is, and what a page refers to on another page goes with it."""
+"""The glossary: each term once, introduced by a page that there is, and what a page refers to on
+another page goes with it."""
 
 from __future__ import annotations
 
@@ -22,12 +23,20 @@ def test_the_glossary_is_in_order_and_says_each_thing_once():
             term.name
         )  # pages without MathJax show it
     contents = (BOOK / "_toc.yml").read_text(encoding="utf-8")
-    manual = {f"manual/{path.name.replace('_', '-')}" for path in (BOOK.parent / "exercises").iterdir()}
+    manual = {
+        f"manual/{path.name.replace('_', '-')}" for path in (BOOK.parent / "exercises").iterdir()
+    }
     for term in terms.terms():
         assert term.page in manual or f"- file: {term.page}\n" in contents, term
         page = term.page.removeprefix("manual/").replace("-", "_")
-        path = BOOK.parent / "exercises" / page / "statement.md" if term.page in manual else BOOK / f"{term.page}.md"
-        assert any(form in terms.bare(path.read_text(encoding="utf-8")) for form in term.forms()), term
+        path = (
+            BOOK.parent / "exercises" / page / "statement.md"
+            if term.page in manual
+            else BOOK / f"{term.page}.md"
+        )
+        assert any(form in terms.bare(path.read_text(encoding="utf-8")) for form in term.forms()), (
+            term
+        )
     uses = [use.casefold() for term in terms.terms() for use in term.uses()]
     assert len(set(uses)) == len(uses)
 

@@ -15,7 +15,9 @@ K = sp.Symbol("K")
 
 def test_an_identity_is_printed_with_its_mark_and_its_label() -> None:
     shown = verified(((x + z) ** 2, x**2 + 2 * x * z + z**2), label="eq-square", how="for every x")
-    assert shown.markdown.startswith("$$\n\\begin{aligned}\n\\left(x + z\\right)^{2} &= x^{2} + 2 x z + z^{2}\n")
+    assert shown.markdown.startswith(
+        "$$\n\\begin{aligned}\n\\left(x + z\\right)^{2} &= x^{2} + 2 x z + z^{2}\n"
+    )
     assert "$$ (eq-square)\n" in shown.markdown
     assert "✓ identity, by SymPy; for every x" in shown.markdown
     record = shown._repr_mimebundle_()[VERIFIED]
@@ -86,20 +88,31 @@ def test_there_must_be_something_to_verify() -> None:
 
 def test_definitions_say_so() -> None:
     shown = typeset((sp.Symbol("K"), p / (p + 1)), label="eq-gain")
-    assert "kf-verified" not in shown.markdown and shown.markdown.endswith('<p class="kf-said">definition</p>')
+    assert "kf-verified" not in shown.markdown and shown.markdown.endswith(
+        '<p class="kf-said">definition</p>'
+    )
     assert shown._repr_mimebundle_()[VERIFIED]["equations"] == 0
 
 
 def test_claims_hold_or_raise() -> None:
-    assert claim("The gain is below **0.7**.", 0.6 < 0.7, np.array([True, True])).markdown.startswith(
-        "The gain is below **0.7**.\u00a0<span"
+    assert claim(
+        "The gain is below **0.7**.", 0.6 < 0.7, np.array([True, True])
+    ).markdown.startswith("The gain is below **0.7**.\u00a0<span")
+    assert claim(f"{0.62:.0%} of them, or 3 %.", True).markdown.startswith(
+        "62\u00a0% of them, or 3 %."
     )
-    assert claim(f"{0.62:.0%} of them, or 3 %.", True).markdown.startswith("62\u00a0% of them, or 3 %.")
     shown = claim(f"From {1e-9:.0e} to {7.25e12:.1e}, $1e-9$ and the variant a1e3.", True).markdown
     assert shown.startswith(r"From $10^{-9}$ to $7.2 \cdot 10^{12}$, $1e-9$ and the variant a1e3.")
-    shown = claim(f"It is {-0.26:+.2f} (-3 before), {-2e-5:.0e} in the years 1960-61, $x_k-1$ and `a[-1]`.", True).markdown
-    assert shown.startswith(r"It is −0.26 (−3 before), −$2 \cdot 10^{-5}$ in the years 1960-61, $x_k-1$ and `a[-1]`.")
-    shown = claim(f"{195959} of {9999} or {12908.44:.1f}, 0.123456, $x=10000$ and `runs=20000`.", True).markdown
+    shown = claim(
+        f"It is {-0.26:+.2f} (-3 before), {-2e-5:.0e} in the years 1960-61, $x_k-1$ and `a[-1]`.",
+        True,
+    ).markdown
+    assert shown.startswith(
+        r"It is −0.26 (−3 before), −$2 \cdot 10^{-5}$ in the years 1960-61, $x_k-1$ and `a[-1]`."
+    )
+    shown = claim(
+        f"{195959} of {9999} or {12908.44:.1f}, 0.123456, $x=10000$ and `runs=20000`.", True
+    ).markdown
     assert shown.startswith("195,959 of 9999 or 12,908.4, 0.123456, $x=10000$ and `runs=20000`.")
     with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
         claim("The gain is below 0.7.", True, np.array([True, False]))
@@ -117,6 +130,9 @@ def test_agreement_within_a_tolerance() -> None:
 def test_sums_are_printed_in_the_order_people_write_them():
     lam, K, S, x, y = sp.symbols("lambda K S x y")
     assert "\\lambda + K \\left(y - S\\right)" in typeset((x, lam + K * (y - S))).markdown
-    assert "\\lambda + K \\left(y - S \\lambda\\right)" in typeset((x, lam + K * (y - S * lam))).markdown
+    assert (
+        "\\lambda + K \\left(y - S \\lambda\\right)"
+        in typeset((x, lam + K * (y - S * lam))).markdown
+    )
     assert "1 + x^{2}" in typeset((y, x**2 + 1)).markdown
     assert "x^{2} + x + 1" in typeset((y, x + 1 + x**2)).markdown  # powers descend

@@ -1,4 +1,5 @@
-"""Parameters of the largest likelihood: closed forms, the Nile, directions that nothing tells, and refusals."""
+"""Parameters of the largest likelihood: closed forms, the Nile, directions that nothing tells, and
+refusals."""
 
 import numpy as np
 import pytest
@@ -12,16 +13,26 @@ pytestmark = pytest.mark.quick
 
 
 def test_the_nile_s_variances():
-    found = estimate(local_level(3000, 3000), nile(), ["q", "r"], ["q", "r"], build=lambda one: aof(linearised(one)))
-    np.testing.assert_allclose(found.value, [1468.5, 15099.7], rtol=5e-5)  # five digits are published
+    found = estimate(
+        local_level(3000, 3000),
+        nile(),
+        ["q", "r"],
+        ["q", "r"],
+        build=lambda one: aof(linearised(one)),
+    )
+    # five digits are published
+    np.testing.assert_allclose(found.value, [1468.5, 15099.7], rtol=5e-5)
     assert found.log_likelihood == pytest.approx(-641.5856, abs=5e-5)
     assert found.flat == ()
     assert float(found.model.parameters["q"]) == found.value[0]
 
 
 def test_a_variance_alone_has_its_closed_form():
-    """A state known exactly: r is the mean square of the measurements, its standard error r sqrt(2 / N)."""
-    model = Model.define("x", "x + w", {"r": 1.0}, prior={"mean": 0.5, "variance": 0}, meter_noise={"variance": "r"})
+    """A state known exactly: r is the mean square of the measurements, its standard error r sqrt(2
+    / N)."""
+    model = Model.define(
+        "x", "x + w", {"r": 1.0}, prior={"mean": 0.5, "variance": 0}, meter_noise={"variance": "r"}
+    )
     y = 0.5 + 3 * np.random.default_rng(1).standard_normal((40, 5, 1))
     y[3, 2] = y[7, 1] = np.nan
     found = estimate(model, y, ["r"], ["r"])
@@ -32,23 +43,33 @@ def test_a_variance_alone_has_its_closed_form():
 
 @pytest.mark.parametrize("start", [1.0, 3.0])
 def test_a_direction_that_is_not_told_is_named_whole(start):
-    """g of any sign and a positive q: only g^2 q reaches the measurements, and neither gets a finite error."""
-    model = Model.define("0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0})
+    """g of any sign and a positive q: only g^2 q reaches the measurements, and neither gets a
+    finite error."""
+    model = Model.define(
+        "0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0}
+    )
     y = simulate(model, 1, 60, seed=1).y
     found = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
-    assert len(found.flat) == 1 and "does not tell g (" in found.flat[0] and ", q (" in found.flat[0]
+    assert (
+        len(found.flat) == 1 and "does not tell g (" in found.flat[0] and ", q (" in found.flat[0]
+    )
     assert np.isinf(found.standard_error).all()
 
 
 def test_what_the_record_does_not_tell_is_named():
-    """Only the product of g and s reaches the measurements: one doubled and the other halved, nothing changes."""
-    model = Model.define("0.9*x + s*v", "g*x + r*w", {"g": 1.5, "s": 0.4, "r": 0.3}, prior={"mean": 0, "variance": 0})
+    """Only the product of g and s reaches the measurements: one doubled and the other halved,
+    nothing changes."""
+    model = Model.define(
+        "0.9*x + s*v", "g*x + r*w", {"g": 1.5, "s": 0.4, "r": 0.3}, prior={"mean": 0, "variance": 0}
+    )
     y = simulate(model, 2, 30, seed=4).y
     found = estimate(model, y, ["g", "s", "r"], ["g", "s", "r"])
     (sentence,) = found.flat
     assert sentence in {
-        "the record does not tell g (+1), s (-1) apart: changed together in these proportions they leave its likelihood as it is",
-        "the record does not tell g (-1), s (+1) apart: changed together in these proportions they leave its likelihood as it is",
+        "the record does not tell g (+1), s (-1) apart: changed together in these proportions "
+        "they leave its likelihood as it is",
+        "the record does not tell g (-1), s (+1) apart: changed together in these proportions "
+        "they leave its likelihood as it is",
     }
     np.testing.assert_array_equal(np.isinf(found.standard_error), [True, True, False])
     # with one of them known, the other and r are what they are with both free
@@ -72,7 +93,11 @@ def test_a_profile_is_the_best_over_the_others():
 @pytest.mark.parametrize(
     ("unknown", "positive", "message"),
     [
-        (["q", "z"], [], "unknown must name parameters of the model, each once: it has q, r; got q, z"),
+        (
+            ["q", "z"],
+            [],
+            "unknown must name parameters of the model, each once: it has q, r; got q, z",
+        ),
         (["q", "q"], [], "each once"),
         ([], [], "got none"),
         (["q"], ["r"], "positive names r, which is not among the unknown"),
@@ -91,7 +116,12 @@ def test_a_start_without_a_likelihood_says_why():
 
 
 def test_a_table_is_a_model_too():
-    table = {"title": "a level", "state": "x + sqrt(q)*v", "meter": "x + w", "parameters": {"q": 0.5}}
+    table = {
+        "title": "a level",
+        "state": "x + sqrt(q)*v",
+        "meter": "x + w",
+        "parameters": {"q": 0.5},
+    }
     y = simulate(Model.of_table(table), 1, 60, seed=1).y
     found, same = (estimate(one, y, "q", "q") for one in (table, Model.of_table(table)))
     assert found.value == same.value

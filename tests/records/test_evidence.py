@@ -23,15 +23,19 @@ FILTERS = {
 
 @pytest.mark.parametrize("kind", FILTERS)
 def test_on_a_linear_model_it_is_the_density_of_the_whole_record(kind):
-    """Matrices that change with the step, noises with means and correlations, whole measurements and components missing."""
+    """Matrices that change with the step, noises with means and correlations, whole measurements
+    and components missing."""
     one = oracles.Changing()
     y = simulate(one.model(), 3, 8, seed=3).y.copy()
     y[2, 1] = y[4, 2, 0] = y[7, 2, 1] = y[0, 1] = np.nan
     found = likelihood(FILTERS[kind](one.model()), y)
     assert found.shape == (8, 3)
     assert found[2, 1] == found[0, 1] == 0
-    expected = [oracles.joint_posterior(one.steps(8), one.laws["prior"], y[:, i])[2] for i in range(3)]
-    np.testing.assert_allclose(found.sum(axis=0), expected, rtol=1e-11)  # a 16 x 16 determinant against eight of 2 x 2
+    expected = [
+        oracles.joint_posterior(one.steps(8), one.laws["prior"], y[:, i])[2] for i in range(3)
+    ]
+    # a 16 x 16 determinant against eight of 2 x 2
+    np.testing.assert_allclose(found.sum(axis=0), expected, rtol=1e-11)
 
 
 def test_the_flow_of_the_nile_has_its_likelihood():
@@ -45,11 +49,15 @@ def test_the_flow_of_the_nile_has_its_likelihood():
 def test_what_has_no_density_is_told():
     model = Model.define("0.9*x + v", "x + w")
     (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1))
-    with pytest.raises(ValueError, match=f"the likelihood needs the structural functions.*{designed.name} has none"):
+    with pytest.raises(
+        ValueError, match=f"the likelihood needs the structural functions.*{designed.name} has none"
+    ):
         likelihood(designed, np.zeros((3, 1, 1)))
     known = Model.define(["x1"], ["x1", "x1"], prior={"mean": [1.0]}, symbols={"x": ["x1"]})
     with pytest.raises(
-        ValueError, match=r"no density for the measurement of step 0, run 0: .* give every component of the meter"
+        ValueError,
+        match=r"no density for the measurement of step 0, run 0: .* give every component of the "
+        r"meter",
     ):
         likelihood(kalman_filter(known), np.ones((2, 1, 2)))
     with pytest.raises(ValueError, match="measurements must have the shape"):

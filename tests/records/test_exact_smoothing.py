@@ -1,4 +1,5 @@
-"""Looking back exactly, and with particles: linear models, brute force over whole trajectories, and the errors that both tell."""
+"""Looking back exactly, and with particles: linear models, brute force over whole trajectories, and
+the errors that both tell."""
 
 import itertools
 
@@ -14,18 +15,22 @@ from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
 
-ROUNDING = 1e-9  # of a mean in its standard deviations: the record's length times that of a density's nodes
+# of a mean in its standard deviations: the record's length times that of a density's nodes
+ROUNDING = 1e-9
 
 
 def off(found, expected):
     """Means in standard deviations, and variances, relative: (steps, runs)."""
     sd = np.sqrt(expected.cov[..., 0, 0])
-    return np.abs(found.mean[..., 0] - expected.mean[..., 0]) / sd, np.abs(found.cov / expected.cov - 1)[..., 0, 0]
+    return np.abs(found.mean[..., 0] - expected.mean[..., 0]) / sd, np.abs(
+        found.cov / expected.cov - 1
+    )[..., 0, 0]
 
 
 @pytest.mark.parametrize("e", [0.3, 0.03, 0.003])
 def test_on_a_linear_model_it_is_the_smoother_of_rauch_tung_and_striebel(e):
-    """Kernels wider and far narrower than the posteriors; a hole, a record that begins with one, and a model that changes."""
+    """Kernels wider and far narrower than the posteriors; a hole, a record that begins with one,
+    and a model that changes."""
     model = Model.define("0.95*x + (1 + k/10)*e*v + 0.1", "x + k/20 + 0.5*w", {"e": e})
     y = simulate(model, 6, 12, seed=2).y.copy()
     y[4:7, 3] = y[0, 1] = y[-1, 2] = np.nan
@@ -39,10 +44,13 @@ def test_on_a_linear_model_it_is_the_smoother_of_rauch_tung_and_striebel(e):
 
 
 def brute_force(y, prior, move, spread, see, noise, means, sds):
-    """Means and variances of three states given all measurements: the density on 161^3 points, eleven deviations to each side."""
+    """Means and variances of three states given all measurements: the density on 161^3 points,
+    eleven deviations to each side."""
 
     def normal(value, mean, sigma):
-        return 0.0 if np.isnan(value).any() else -0.5 * ((value - mean) / sigma) ** 2 - np.log(sigma)
+        return (
+            0.0 if np.isnan(value).any() else -0.5 * ((value - mean) / sigma) ** 2 - np.log(sigma)
+        )
 
     axes = [mean + np.linspace(-11, 11, 161) * sd for mean, sd in zip(means, sds, strict=True)]
     x = np.meshgrid(*axes, indexing="ij", sparse=True)
@@ -55,18 +63,35 @@ def brute_force(y, prior, move, spread, see, noise, means, sds):
     edges = max(density.take(i, axis=axis).sum() for axis in range(3) for i in (0, -1))
     masses = [density.sum(axis=tuple({0, 1, 2} - {k})) for k in range(3)]
     found = np.array([mass @ axis for mass, axis in zip(masses, axes, strict=True)])
-    return found, np.array([mass @ (axis - m) ** 2 for mass, axis, m in zip(masses, axes, found, strict=True)]), edges
+    return (
+        found,
+        np.array(
+            [mass @ (axis - m) ** 2 for mass, axis, m in zip(masses, axes, found, strict=True)]
+        ),
+        edges,
+    )
 
 
 MODELS = {
     "53": (
-        find_variant("53").model, (0, 1), lambda x: 0.9 * x, lambda x: 0.05 * np.abs(x), lambda x: x, lambda x: 0.02 * x**2,
+        find_variant("53").model,
+        (0, 1),
+        lambda x: 0.9 * x,
+        lambda x: 0.05 * np.abs(x),
+        lambda x: x,
+        lambda x: 0.02 * x**2,
     ),
     "curved": (
-        Model.define("x + sin(x) + 0.4*v", "x + x**2/10 + 0.5*w", prior={"mean": 0.5, "variance": 0.3}),
-        (0.5, np.sqrt(0.3)), lambda x: x + np.sin(x), lambda x: 0.4, lambda x: x + x**2 / 10, lambda x: 0.5,
+        Model.define(
+            "x + sin(x) + 0.4*v", "x + x**2/10 + 0.5*w", prior={"mean": 0.5, "variance": 0.3}
+        ),
+        (0.5, np.sqrt(0.3)),
+        lambda x: x + np.sin(x),
+        lambda x: 0.4,
+        lambda x: x + x**2 / 10,
+        lambda x: 0.5,
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", ["53", "curved"])
@@ -82,13 +107,16 @@ def test_it_is_the_posterior_of_the_whole_trajectory(name, missing):
         sds = np.sqrt(found.cov[:, i, 0, 0])
         mean, variance, edges = brute_force(y[:, i, 0], *known, found.mean[:, i, 0], sds)
         assert edges < 1e-8
-        assert (np.abs(found.mean[:, i, 0] - mean) <= error[:, i] + 1e-6 * sds).all()  # what the cube leaves out
-        np.testing.assert_allclose(found.cov[:, i, 0, 0], variance, rtol=1e-4)  # the accuracy asked for is 1e-3
+        # what the cube leaves out
+        assert (np.abs(found.mean[:, i, 0] - mean) <= error[:, i] + 1e-6 * sds).all()
+        # the accuracy asked for is 1e-3
+        np.testing.assert_allclose(found.cov[:, i, 0, 0], variance, rtol=1e-4)
     assert error.max() < 1e-3 * np.sqrt(found.cov.max())
 
 
 def test_a_record_that_contradicts_the_model_is_right_or_refused():
-    """A prior 4 to 11 deviations away from the measurements, at once or by and by; the Kalman filter has the truth."""
+    """A prior 4 to 11 deviations away from the measurements, at once or by and by; the Kalman
+    filter has the truth."""
     refused, model = [], Model.define("x + 0.1*v", "x + 0.5*w")
     for first, level in itertools.product((np.nan, 0.0), np.arange(4.0, 12.0)):
         y, one = np.array([first, *4 * [level]])[:, None, None], pointmass(model)
@@ -115,8 +143,10 @@ def test_with_a_lag_it_is_the_posterior_of_a_shorter_record(lag):
         for i in range(4):
             sds = np.sqrt(smooth(pointmass(model), seen).cov[:, i, 0, 0])
             mean, variance, _ = brute_force(seen[:, i, 0], *known, found.mean[:, i, 0], sds)
-            assert abs(found.mean[k, i, 0] - mean[k]) <= error[k, i] + 1e-6 * sds[k]  # what the cube leaves out
-            assert found.cov[k, i, 0, 0] == pytest.approx(variance[k], rel=1e-4)  # the accuracy asked for is 1e-3
+            # what the cube leaves out
+            assert abs(found.mean[k, i, 0] - mean[k]) <= error[k, i] + 1e-6 * sds[k]
+            # the accuracy asked for is 1e-3
+            assert found.cov[k, i, 0, 0] == pytest.approx(variance[k], rel=1e-4)
     later = smooth(pointmass(model), y)
     assert np.abs(found.mean - later.mean)[0].min() > 0.01
     np.testing.assert_array_equal(found.mean[3 - lag - 1 :], later.mean[3 - lag - 1 :])
@@ -143,16 +173,24 @@ def test_particles_look_back_as_well_as_they_say(plane):
     one = particle(plane, 1000, seed=1)
     found, error = smooth(one, y), smoothing_error(one, y)
     away = np.linalg.norm(found.mean - expected.mean, axis=-1)
-    # 600 distances, half of them those of two clouds: root mean squares good to some 5 %, steps dependent
+    # 600 distances, half of them those of two clouds: root mean squares good to some 5 %, steps
+    # dependent
     assert np.sqrt(np.mean(away**2)) == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.2)
-    assert np.sqrt(np.mean(away[:-1] ** 2)) < 0.3 * np.sqrt(np.mean((run(one, y).mean - found.mean)[:-1] ** 2))
-    ratio = (np.trace(found.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)).mean(axis=1)
-    assert np.abs(ratio - 1).max() < 0.08  # 60 covariances of 1,000 particles, of which a few hundred count
+    assert np.sqrt(np.mean(away[:-1] ** 2)) < 0.3 * np.sqrt(
+        np.mean((run(one, y).mean - found.mean)[:-1] ** 2)
+    )
+    ratio = (
+        np.trace(found.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)
+    ).mean(axis=1)
+    # 60 covariances of 1,000 particles, of which a few hundred count
+    assert np.abs(ratio - 1).max() < 0.08
 
 
 def test_an_object_without_noise_of_its_own_has_no_density_to_look_back_by():
     model = Model.define(["x1 + x2", "x2 + v"], ["x1 + w"])
-    with pytest.raises(ModelError, match="particles look back by the density of the next state, and it has none"):
+    with pytest.raises(
+        ModelError, match="particles look back by the density of the next state, and it has none"
+    ):
         smooth(particle(model, 20), np.zeros((3, 1, 1)))
 
 
@@ -170,11 +208,13 @@ def test_smoothers_are_compared_with_the_exact_one():
     np.testing.assert_array_equal(plain.gap("aof-gaussian").value, both.gap("aof-gaussian").value)
     found = both.smoothing
     assert found.names == ("aof-gaussian", "aof-linearised", "aof-exact")
-    last = found.bound()[3], both.bound()[3]  # after the last measurement nothing comes; on the same trajectories
+    # after the last measurement nothing comes; on the same trajectories
+    last = found.bound()[3], both.bound()[3]
     assert last[0].value == pytest.approx(last[1].value, rel=1e-3)
     assert (found.bound().value[:-1] < 0.9 * both.bound().value[:-1]).all()
     gap = found.gap("aof-gaussian")
-    # the Gaussian smoother's known weakness: 44 % above the exact one at the first step, where its filter is 4 % above
+    # the Gaussian smoother's known weakness: 44 % above the exact one at the first step, where its
+    # filter is 4 % above
     assert gap.value[0] - 4 * gap.standard_error[0] > 0.2
     # what `smooth` gives is what is compared
     x, y = simulate(model, 400, 4, seed=5)

@@ -42,14 +42,17 @@ def test_the_intervals_cover(edge, by_component):
     # with a narrower gate what it refuses, large in truth, makes the prediction after it too sure
     gate = gated(one, min(edge, 0.9999), patience=None, by_component=by_component)
     told = examine(one if edge == 1 else gate, y, edge, by_component)
-    kept = [run for run in range(300) if (told.weight[:, run] > 0).sum() > 30]  # not those whose track was lost
+    # not those whose track was lost
+    kept = [run for run in range(300) if (told.weight[:, run] > 0).sum() > 30]
     assert len(kept) > 295
     inside = np.mean([[one.fits for one in findings(told, run=run)] for run in kept], axis=0)
     assert (np.abs(inside - 0.95) < 4 * np.sqrt(0.95 * 0.05 / len(kept))).all(), inside
 
 
 def test_a_wrong_filter_is_found():
-    rough = Model.define(["x + u", "u + 0.3*v"], ["x + 0.5*w1", "u + 0.5*w2"], symbols={"x": ["x", "u"]})
+    rough = Model.define(
+        ["x + u", "u + 0.3*v"], ["x + 0.5*w1", "u + 0.5*w2"], symbols={"x": ["x", "u"]}
+    )
     stiff = Model.define(["x + u", "u + 0.01*v"], ["x + w1", "u + w2"], symbols={"x": ["x", "u"]})
     offset = simulate(MODEL, 1, 200, seed=5).y + np.array([0.0, 0.6])
     _, y = simulate(MODEL, 1, 200, seed=5)

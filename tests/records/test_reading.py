@@ -1,4 +1,5 @@
-"""From a file to a filter: what is read is what stands there, and what cannot be used is named by line and column."""
+"""From a file to a filter: what is read is what stands there, and what cannot be used is named by
+line and column."""
 
 import re
 
@@ -34,7 +35,9 @@ def read(tmp_path):
 
 def expected(record):
     np.testing.assert_array_equal(record.times, [0, 0.5, 2, 2])
-    np.testing.assert_array_equal(record.y[:, 0], [[1.5, np.nan], [np.nan, -3], [1, np.nan], [7, 8]])
+    np.testing.assert_array_equal(
+        record.y[:, 0], [[1.5, np.nan], [np.nan, -3], [1, np.nan], [7, 8]]
+    )
     assert record.model.known.inputs == {"dt": (0.5, 1.5, 0.0, 0.0), "a": (2.0, 2.0, 4.0, 5.0)}
 
 
@@ -52,7 +55,18 @@ def expected(record):
         GOOD.replace("1.5", '"1.5"').replace("\n2,1", "\n\n2,1"),
         "other,a,y2,time,y1\nno,2,,0,1.5\nmatter,,-3,.5,\nwhat,4,,2,1.\n=1+1,5,8,2,7\n",
     ],
-    ids=["plain", "bom", "crlf", "cr", "tabs", "decimal commas", "spaces", "t", "quotes, blank line", "other columns"],
+    ids=[
+        "plain",
+        "bom",
+        "crlf",
+        "cr",
+        "tabs",
+        "decimal commas",
+        "spaces",
+        "t",
+        "quotes, blank line",
+        "other columns",
+    ],
 )
 def test_the_same_record_in_many_forms(read, content):
     expected(read(content))
@@ -63,7 +77,9 @@ def test_columns_may_have_other_names(read):
     expected(read(content, columns={"time": "seconds", "y1": "east", "a": "push"}))
     with pytest.raises(RecordError, match=r"no column 'north'.*--column y1=\.\.\."):
         read(content, columns={"time": "seconds", "y1": "north", "a": "push"})
-    with pytest.raises(RecordError, match="columns are given for b; the model needs a, dt, time, y1, y2"):
+    with pytest.raises(
+        RecordError, match="columns are given for b; the model needs a, dt, time, y1, y2"
+    ):
         read(content, columns={"b": "push"})
     with pytest.raises(RecordError, match="no column 'minutes'"):
         read(GOOD, columns={"time": "minutes"})
@@ -84,21 +100,28 @@ def test_the_time_in_formulas_is_the_recorded_one(read):
 def test_uneven_steps_that_the_model_does_not_know_of(read):
     with pytest.warns(RecordWarning, match=r"intervals are 1 to 4.*dt = \[1\]"):
         read("time,y\n0,1\n1,1\n5,1\n", PLAIN)
-    assert len(read("time,y\n0,1\n1,1\n2.001,1\n", PLAIN).y) == 3  # an hour of a clock's jitter is no warning
+    # an hour of a clock's jitter is no warning
+    assert len(read("time,y\n0,1\n1,1\n2.001,1\n", PLAIN).y) == 3
 
 
 def test_a_column_that_may_be_the_times_is_named(read):
     """A model that takes every step alike needs no times: a warning."""
-    with pytest.warns(RecordWarning, match="the column 'Time' is not used; if it has the times.*--column time=Time"):
+    with pytest.warns(
+        RecordWarning,
+        match="the column 'Time' is not used; if it has the times.*--column time=Time",
+    ):
         assert len(read("Time,y\n0,1\n1,1\n", PLAIN).y) == 2
     with pytest.warns(RecordWarning, match="intervals are 1 to 4"):
         read("Time,y\n0,1\n1,1\n5,1\n", PLAIN, columns={"time": "Time"})
 
 
 def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
-    """But not those before the names or after the last row, nor of several columns, where a missing row has its commas."""
+    """But not those before the names or after the last row, nor of several columns, where a missing
+    row has its commas."""
     for end in ("", "\n", "\n\n\n"):
-        np.testing.assert_array_equal(read(f"\n\ny\n1\n\n  \n4{end}", PLAIN).y.ravel(), [1, np.nan, np.nan, 4])
+        np.testing.assert_array_equal(
+            read(f"\n\ny\n1\n\n  \n4{end}", PLAIN).y.ravel(), [1, np.nan, np.nan, 4]
+        )
 
 
 @pytest.mark.parametrize(
@@ -108,10 +131,12 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
         ("time,y1,y2,a\n", "no rows"),
         ("time,y1,a\n0,1,2\n", "no column 'y2'"),
         ("time,y1,y2,a,y1\n0,1,2,3,4\n", "two columns are named 'y1'"),
-        (GOOD.replace("-3e0", "three"), "line 3, column y2: expected a number or nothing, got 'three'"),
+        (GOOD.replace("-3e0", "three"), "line 3, column y2: expected a number or nothing, got "
+"'three'"),
         (GOOD.replace("-3e0", "1e999"), "line 3, column y2: '1e999' is beyond"),
         (GOOD.replace("-3e0", '"1,5"'), "line 3, column y2:.*separate cells by semicolons"),
-        (GOOD.replace("-3e0", "1,5"), "line 3: 5 cells, but the first line names 4 columns; where a comma"),
+        (GOOD.replace("-3e0", "1,5"), "line 3: 5 cells, but the first line names 4 columns; where "
+"a comma"),
         (GOOD.replace("0.5,,", "0.5,"), "line 3: 3 cells"),
         (GOOD.replace("0.5,", ","), "line 3, column time: empty"),
         (GOOD.replace("\n2,1", "\n0.25,1"), "line 4, column time: 0.25 comes after 0.5; sort"),
@@ -123,19 +148,25 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
         (GOOD.encode("utf-16"), "is UTF-16"),
         (GOOD.replace("-3e0", "é").encode("latin-1"), "line 3: a byte that is not UTF-8"),
         # what people bring
-        (GOOD.replace("time", "Time"), "no column time, which the model needs; if 'Time' is it.*--column time=Time"),
+        (GOOD.replace("time", "Time"), "no column time, which the model needs; if 'Time' is "
+"it.*--column time=Time"),
         (GOOD.replace("y2", "Y2 [m]"), r"no column 'y2'.*if 'Y2 \[m\]' is it, say so"),
-        (GOOD.replace("0.5,", "2014-03-26T10:00:00Z,"), "line 3, column time: .*a date or a clock's time: write seconds"),
+        (GOOD.replace("0.5,", "2014-03-26T10:00:00Z,"), "line 3, column time: .*a date or a "
+"clock's time: write seconds"),
         (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
-        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2: 'm, m, N, s' and no number; if these are units, delete the line"),
+        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2: 'm, m, N, s' and no number; if these are "
+"units, delete the line"),
         (GOOD.replace(",", " "), "spaces do not separate cells"),
-        ("# recorded by me\n" + GOOD, "line 1: '# recorded by me' is a comment.*delete what stands above"),
-        ("# " + GOOD.replace("time", "y1").replace("y1,y1", "y1,b"), r"is a comment.*numpy\.savetxt"),
+        ("# recorded by me\n" + GOOD, "line 1: '# recorded by me' is a comment.*delete what "
+"stands above"),
+        ("# " + GOOD.replace("time", "y1").replace("y1,y1", "y1,b"), r"is a "
+r"comment.*numpy\.savetxt"),
         ("time,y1,y2,a\n" + "".join(f"{t},1,2,3\n" for t in (0, 1800, 3600, 1800, 3600, 5400)),
          "line 5, column time: 1800 comes after 3600; the clock was set back once.*Do not sort"),
         ("time,y1,y2,a\n" + "".join(f"{t},1,2,3\n" for t in (0, 1200, 2400, 3600, 1200, 2400)),
          "an hour of daylight saving that is there twice"),
-        ("time,y1,y2,a\n1484649904.25,1,2,3\n1484649904.2,1,2,3\n", "1484649904.2 comes after 1484649904.25"),
+        ("time,y1,y2,a\n1484649904.25,1,2,3\n1484649904.2,1,2,3\n", "1484649904.2 comes after "
+"1484649904.25"),
     ],
 )  # fmt: skip
 def test_a_bad_file_is_refused_with_its_place(read, content, message):

@@ -1,4 +1,5 @@
-"""Smoothers: one dense regression on linear models, the likeliest trajectory, brute force, and published figures."""
+"""Smoothers: one dense regression on linear models, the likeliest trajectory, brute force, and
+published figures."""
 
 import numpy as np
 import oracles
@@ -22,7 +23,9 @@ STRUCTURES = {
     "cubature": lambda model: unscented(model, kappa=0),
     "gauss-hermite": lambda model: gauss_hermite(model, 3),
 }
-FILTERS = {name: lambda model, build=build: aof(build(model)) for name, build in STRUCTURES.items()} | {
+FILTERS = {
+    name: lambda model, build=build: aof(build(model)) for name, build in STRUCTURES.items()
+} | {
     "kalman": kalman_filter,
     "iterated": lambda model: iterated(linearised(model), 3),
 }
@@ -35,7 +38,8 @@ def changing() -> Model:
 
 
 def with_gaps(y):
-    """Whole measurements and components missing, others in each run; one run's first and another's last."""
+    """Whole measurements and components missing, others in each run; one run's first and another's
+    last."""
     y = y.copy()
     y[3, 1] = y[5, 2, 0] = y[0, 3] = y[-1, 0, 1] = y[6:8, 4] = np.nan
     return y
@@ -46,8 +50,12 @@ def record(changing):
     """Measurements with gaps (9, 5, 2), and what one dense regression finds in them."""
     y = with_gaps(simulate(changing, 5, STEPS, seed=2).y)
     one = oracles.Changing()
-    found = [oracles.joint_posterior(one.steps(STEPS), one.laws["prior"], y[:, run]) for run in range(5)]
-    return y, Gaussian(np.stack([one[0] for one in found], axis=1), np.stack([one[1] for one in found], axis=1))
+    found = [
+        oracles.joint_posterior(one.steps(STEPS), one.laws["prior"], y[:, run]) for run in range(5)
+    ]
+    return y, Gaussian(
+        np.stack([one[0] for one in found], axis=1), np.stack([one[1] for one in found], axis=1)
+    )
 
 
 def same(found, expected):
@@ -57,8 +65,11 @@ def same(found, expected):
 
 
 @pytest.mark.parametrize("kind", FILTERS)
-def test_on_a_linear_model_every_smoother_is_the_regression_on_the_whole_record(changing, record, kind):
-    """The structural functions of a linear model are exact whatever the approximation, and all laws are normal."""
+def test_on_a_linear_model_every_smoother_is_the_regression_on_the_whole_record(
+    changing, record, kind
+):
+    """The structural functions of a linear model are exact whatever the approximation, and all laws
+    are normal."""
     y, expected = record
     same(smooth(FILTERS[kind](changing), y), expected)
 
@@ -93,16 +104,19 @@ def test_the_pendulum_s_smoothers_have_their_published_errors(name, build):
     x, y = pendulum_data()
     mean = smooth(aof(build(pendulum())), y).mean[1:, 0, 0]
     # 500 steps there and back round differently in another order of operations
-    assert np.sqrt(np.mean((mean - x[:, 0]) ** 2)) == pytest.approx(PENDULUM_SMOOTHED[name], rel=1e-12)
+    assert np.sqrt(np.mean((mean - x[:, 0]) ** 2)) == pytest.approx(
+        PENDULUM_SMOOTHED[name], rel=1e-12
+    )
 
 
 @pytest.fixture(scope="module")
 def curved() -> Model:
     """Object and meter curved, the object's noise multiplied by the state."""
     return Model.define(
-        ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + (0.3 + 0.1*x1**2)*v2"], ["x1**2/2 + x2 + 0.3*w"],
+        ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + (0.3 + 0.1*x1**2)*v2"],
+        ["x1**2/2 + x2 + 0.3*w"],
         prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
-    )  # fmt: skip
+    )
 
 
 def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
@@ -113,19 +127,37 @@ def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
     y = simulate(model, 4, 5, seed=3).y.copy()
     y[2, 1] = np.nan
     prior_root = np.linalg.cholesky(np.linalg.inv(model.prior.cov))
-    found, once = smooth_iterated(linearised(model), y, rounds=60), smooth(aof(linearised(model)), y)
+    found, once = (
+        smooth_iterated(linearised(model), y, rounds=60),
+        smooth(aof(linearised(model)), y),
+    )
     for i in range(4):
 
         def residuals(flat, i=i):
             x = flat.reshape(5, 2)
-            a = np.stack([x[:, 0] + 0.3 * np.sin(x[:, 1]), 0.9 * x[:, 1] + 0.2 * x[:, 0] * x[:, 1]], axis=1)
+            a = np.stack(
+                [x[:, 0] + 0.3 * np.sin(x[:, 1]), 0.9 * x[:, 1] + 0.2 * x[:, 0] * x[:, 1]], axis=1
+            )
             seen = np.nan_to_num((y[:, i, 0] - x[:, 0] ** 2 / 2 - x[:, 1]) / 0.3)
-            return np.concatenate([prior_root.T @ (x[0] - model.prior.mean), ((x[1:] - a[:-1]) / [0.2, 0.3]).ravel(), seen])
+            return np.concatenate(
+                [
+                    prior_root.T @ (x[0] - model.prior.mean),
+                    ((x[1:] - a[:-1]) / [0.2, 0.3]).ravel(),
+                    seen,
+                ]
+            )
 
         minimum = least_squares(
-            residuals, once.mean[:, i].ravel(), method="lm", jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15
+            residuals,
+            once.mean[:, i].ravel(),
+            method="lm",
+            jac="3-point",
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
         )
-        # 3-point differences and the search are right to some 1e-8 of a standard deviation, times the condition
+        # 3-point differences and the search are right to some 1e-8 of a standard deviation, times
+        # the condition
         np.testing.assert_allclose(found.mean[:, i].ravel(), minimum.x, rtol=0, atol=1e-6)
         cov = np.linalg.inv(minimum.jac.T @ minimum.jac)
         blocks = np.stack([cov[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in range(5)])
@@ -134,17 +166,24 @@ def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
 
 
 def test_angles_go_the_short_way_round_in_the_past_too():
-    """A heading that wanders about pi, and the same one seen from a zero that lies elsewhere: only whole turns differ."""
+    """A heading that wanders about pi, and the same one seen from a zero that lies elsewhere: only
+    whole turns differ."""
 
     def turned(by):
         model = Model.define(
-            ["x1 + 0.5*x2 + 0.1*v1", "x2 + 0.2*v2"], ["x1 + 0.3*w"], angles={"x": ["x1"], "y": ["y"]},
+            ["x1 + 0.5*x2 + 0.1*v1", "x2 + 0.2*v2"],
+            ["x1 + 0.3*w"],
+            angles={"x": ["x1"], "y": ["y"]},
             prior={"mean": [3.0 + by, 0.1], "variance": 0.2},
-        )  # fmt: skip
+        )
         y = np.pi + by + 0.3 * np.sin(np.arange(40.0) ** 2)
         return model, (y - 2 * np.pi * np.round(y / (2 * np.pi)))[:, None, None]
 
-    for build in (lambda model: aof(linearised(model)), lambda model: aof(unscented(model)), kalman_filter):
+    for build in (
+        lambda model: aof(linearised(model)),
+        lambda model: aof(unscented(model)),
+        kalman_filter,
+    ):
         found, other = (smooth(build(model), y) for model, y in (turned(0.0), turned(-2.5)))
         assert np.abs(found.mean[..., 0]).max() <= np.pi
         np.testing.assert_allclose(found.cov, other.cov, rtol=1e-9)
@@ -152,7 +191,10 @@ def test_angles_go_the_short_way_round_in_the_past_too():
         np.testing.assert_allclose(np.cos(apart[..., 0]), 1, rtol=1e-12)
         np.testing.assert_allclose(apart[..., 1], 0, atol=1e-9)
     model, y = turned(0.0)
-    again, lagged = smooth_iterated(linearised(model), y, rounds=3), smooth(kalman_filter(model), y, lag=len(y))
+    again, lagged = (
+        smooth_iterated(linearised(model), y, rounds=3),
+        smooth(kalman_filter(model), y, lag=len(y)),
+    )
     for other in (again, lagged):
         np.testing.assert_allclose(other.mean, smooth(kalman_filter(model), y).mean, atol=1e-9)
 
@@ -176,7 +218,10 @@ def test_a_filter_whose_laws_are_not_normal_cannot_look_back(curved):
     model = Model.define("0.9*x + v", "x + w")
     (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1))
     for one in (designed, imm([linearised(model)], [[1.0]])):
-        with pytest.raises(ValueError, match=rf"looking back needs the structural functions.*{one.name} has none.*take one"):
+        with pytest.raises(
+            ValueError,
+            match=rf"looking back needs the structural functions.*{one.name} has none.*take one",
+        ):
             smooth(one, np.zeros((3, 1, 1)))
     with pytest.raises(ValueError, match="measurements must have the shape"):
         smooth(aof(linearised(model)), np.zeros((3, 2)))

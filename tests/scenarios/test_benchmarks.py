@@ -27,7 +27,8 @@ from kfcourse.symbolic.equations import compile_noiseless
 
 @pytest.mark.quick
 def test_the_attractor_is_that_of_lorenz():
-    """One step of Heun's rule against SciPy's: it errs by some hundredths here, as its error is of third order; Euler's by .3."""
+    """One step of Heun's rule against SciPy's: it errs by some hundredths here, as its error is of
+    third order; Euler's by .3."""
 
     def slope(t, u):
         return [10 * (u[1] - u[0]), 28 * u[0] - u[1] - u[0] * u[2], u[0] * u[1] - 8 * u[2] / 3]
@@ -46,15 +47,20 @@ def test_the_attractor_is_that_of_lorenz():
 
 
 def test_the_extended_filter_has_the_published_errors():
-    """Means of roots of mean square errors over runs, within four standard errors of both simulations and the printed digits."""
+    """Means of roots of mean square errors over runs, within four standard errors of both
+    simulations and the printed digits."""
     x, y = bearings_data(200, 1)
     error = run(aof(linearised(bearings())), y).mean[1:, :, :2] - x
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
-    assert abs(each.mean() - BEARINGS_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 200 + 1 / 1000) + 5e-4
+    assert (
+        abs(each.mean() - BEARINGS_ERRORS["EKF"])
+        < 4 * each.std() * np.sqrt(1 / 200 + 1 / 1000) + 5e-4
+    )
 
 
 def test_the_reentry_of_the_source():
-    """Newton's law and the drag, in plain numbers; and the extended filter's published error, km."""
+    """Newton's law and the drag, in plain numbers; and the extended filter's published error,
+    km."""
     x, y = simulate(reentry(known=True), 40, 2001, seed=1)
     r, speed = np.hypot(x[0, 0, 0], x[0, 0, 1]), np.hypot(x[0, 0, 2], x[0, 0, 3])
     drag = -0.59783 * np.exp(0.6932) * np.exp((6374 - r) / 13.406) * speed
@@ -64,7 +70,9 @@ def test_the_reentry_of_the_source():
     y[0] = np.nan  # the source predicts before its first correction
     error = (run(aof(linearised(reentry(known=False))), y).mean - x)[1:, :, :2]
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
-    assert abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 40 + 1 / 100) + 5e-5
+    assert (
+        abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 40 + 1 / 100) + 5e-5
+    )
 
 
 @pytest.mark.quick
@@ -80,7 +88,10 @@ def test_the_car_of_the_source():
         K = np.linalg.solve(H @ P @ H.T + 0.25 * np.eye(2), H @ P).T
         m, P = m + K @ (measured - H @ m), P - K @ H @ P
         means.append(m)
-    np.testing.assert_allclose(run(kalman_filter(car()), y).mean[1:, 0], means, rtol=1e-11, atol=1e-11)  # 100 steps of rounding
+    # 100 steps of rounding
+    np.testing.assert_allclose(
+        run(kalman_filter(car()), y).mean[1:, 0], means, rtol=1e-11, atol=1e-11
+    )
     for name, place in (("measurements", y[1:, 0]), ("Kalman", np.array(means)[:, :2])):
         assert abs(np.sqrt(((place - x[:, :2]) ** 2).sum(axis=1).mean()) - CAR_ERRORS[name]) < 1e-12
 
@@ -88,7 +99,12 @@ def test_the_car_of_the_source():
 @pytest.mark.quick
 def test_the_pendulum_s_data_are_the_file_s():
     x, y = pendulum_data()
-    assert x.shape == (500, 2) and y.shape == (501, 1, 1) and np.isnan(y[0, 0, 0]) and np.isfinite(y[1:]).all()
+    assert (
+        x.shape == (500, 2)
+        and y.shape == (501, 1, 1)
+        and np.isnan(y[0, 0, 0])
+        and np.isfinite(y[1:]).all()
+    )
 
 
 def test_the_conditionally_minimax_models_are_those_of_the_source():

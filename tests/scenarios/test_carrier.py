@@ -12,7 +12,9 @@ pytestmark = pytest.mark.quick
 @pytest.mark.parametrize(("order", "offset"), [(1, 0.0), (2, 40.0)])
 def test_without_noise_it_is_a_cosine(order, offset):
     start = (0, 0.4, offset)
-    quiet = phase_meter(order, start, (0, 0, 0), A=3, sigma=0, s_phi=0, **({"s_nu": 0} if order == 2 else {}))
+    quiet = phase_meter(
+        order, start, (0, 0, 0), A=3, sigma=0, s_phi=0, **({"s_nu": 0} if order == 2 else {})
+    )
     seen = simulate(quiet, 1, 50, seed=1).y[:, 0, 0]
     k = np.arange(50)
     expected = 3 * np.cos(2 * np.pi * k / PARAMETERS["N"] + 0.4 + offset * PARAMETERS["T"] * k)

@@ -1,4 +1,5 @@
-"""The recorded drive: the file's own numbers, its licence beside it, and what its sensors have in common."""
+"""The recorded drive: the file's own numbers, its licence beside it, and what its sensors have in
+common."""
 
 import csv
 from importlib import resources
@@ -22,10 +23,14 @@ def test_the_record_is_the_file_s():
     # A kilometre east on this parallel, and north, by the arc that a degree is
     degree = np.pi * RADIUS / 180
     first, last = rows[filled[0]], rows[filled[-1]]
-    lat, lon = ([float(row[f"{name}_deg"]) for row in (first, last)] for name in ("latitude", "longitude"))
+    lat, lon = (
+        [float(row[f"{name}_deg"]) for row in (first, last)] for name in ("latitude", "longitude")
+    )
     step = [degree * np.cos(np.radians(lat[0])) * (lon[1] - lon[0]), degree * (lat[1] - lat[0])]
     np.testing.assert_allclose(record.place[filled[-1]], step, rtol=1e-9)
-    assert record.yaw_rate[0] == pytest.approx(np.radians(-18.713)) and record.speed[0] == pytest.approx(2.42 / 3.6)
+    assert record.yaw_rate[0] == pytest.approx(np.radians(-18.713)) and record.speed[
+        0
+    ] == pytest.approx(2.42 / 3.6)
 
 
 def test_the_notice_stands_beside_it():
@@ -41,7 +46,8 @@ def test_fixes_are_thinned_and_begin_when_the_car_moves():
 
 
 def test_the_angle_turned_is_the_course_s_difference():
-    """Course and gyroscope agree while the car moves, to a tenth of a radian, the receiver's lag taken into account."""
+    """Course and gyroscope agree while the car moves, to a tenth of a radian, the receiver's lag
+    taken into account."""
     record = recorded()
     apart = np.exp(1j * (record.course - turned(record.times - 1.05)))[record.speed > 3]
     assert abs(apart.mean()) > 1 - 0.2**2 / 2
@@ -53,6 +59,8 @@ def test_the_angle_turned_is_the_course_s_difference():
 
 
 def test_beyond_the_record():
-    assert turned(np.array([-1.0]))[0] == 0 and turned(np.array([217.0])) == turned(np.array([recorded().times[-1]]))
+    assert turned(np.array([-1.0]))[0] == 0 and turned(np.array([217.0])) == turned(
+        np.array([recorded().times[-1]])
+    )
     with pytest.raises(ValueError, match="every must be a positive whole number"):
         fixes(0)

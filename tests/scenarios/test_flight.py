@@ -8,7 +8,15 @@ from scipy.integrate import solve_ivp
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
-from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, cartesian, kinematic, measure_cartesian, measure_spherical, spherical
+from kfcourse.scenarios.radar import (
+    CARTESIAN,
+    SPHERICAL,
+    cartesian,
+    kinematic,
+    measure_cartesian,
+    measure_spherical,
+    spherical,
+)
 
 pytestmark = pytest.mark.quick
 
@@ -28,7 +36,15 @@ OTHER = dict(
 def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate():
     track = aircraft(1.3, **OTHER)
     speeds, radii, turns, ramp = OTHER["speeds"], OTHER["radii"], OTHER["turns"], OTHER["ramp"]
-    ends = np.cumsum([50.0, abs(turns[0]) * radii[0] / speeds[0] + ramp, 45.0, abs(turns[1]) * radii[1] / speeds[1] + ramp, 30.0])
+    ends = np.cumsum(
+        [
+            50.0,
+            abs(turns[0]) * radii[0] / speeds[0] + ramp,
+            45.0,
+            abs(turns[1]) * radii[1] / speeds[1] + ramp,
+            30.0,
+        ]
+    )
 
     def smooth(u):
         u = min(max(u, 0.0), 1.0)
@@ -39,7 +55,9 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
 
     def slope(t, state):
         _, _, _, speed, heading = state
-        rate = -speeds[0] / radii[0] * bump(t, ends[0], ends[1]) + speeds[1] / radii[1] * bump(t, ends[2], ends[3])
+        rate = -speeds[0] / radii[0] * bump(t, ends[0], ends[1]) + speeds[1] / radii[1] * bump(
+            t, ends[2], ends[3]
+        )
         slowing = -(speeds[0] - speeds[1]) / (45.0 - ramp) * bump(t, ends[1], ends[2])
         sinking = -7.0 * smooth((t - ends[2]) / ramp)
         return [speed * np.cos(heading), speed * np.sin(heading), sinking, slowing, rate]
@@ -47,9 +65,12 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
     first = [*OTHER["start"], speeds[0], OTHER["heading"]]
     options = dict(method="DOP853", rtol=1e-12, atol=1e-9, max_step=0.5)
     solved = solve_ivp(slope, (0, track.time[-1]), first, t_eval=track.time, **options).y.T
-    # Tolerance 1e-12 of 4e4 m over some 10^3 steps; the kinks of the ramps and the interpolation between steps cost more.
+    # Tolerance 1e-12 of 4e4 m over some 10^3 steps; the kinks of the ramps and the interpolation
+    # between steps cost more.
     np.testing.assert_allclose(track.position, solved[:, :3], rtol=0, atol=1e-4)
-    np.testing.assert_allclose(np.linalg.norm(track.velocity[:, :2], axis=1), solved[:, 3], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        np.linalg.norm(track.velocity[:, :2], axis=1), solved[:, 3], rtol=0, atol=1e-6
+    )
     np.testing.assert_array_equal(track.part, 1 + np.searchsorted(ends[:4], track.time))
 
 
@@ -88,7 +109,11 @@ def test_measurements_have_the_given_errors():
     track, runs = aircraft(10.0), 4000
     true = spherical(track.position)
     for measured, expected, sigmas in (
-        (measure_cartesian(track, (10.0, 30.0, 50.0), runs, seed=1), track.position, (10.0, 30.0, 50.0)),
+        (
+            measure_cartesian(track, (10.0, 30.0, 50.0), runs, seed=1),
+            track.position,
+            (10.0, 30.0, 50.0),
+        ),
         (measure_cartesian(track, 20.0, runs, seed=2), track.position, (20.0,) * 3),
         (measure_spherical(track, (40.0, 2e-3, 3e-3), runs, seed=3), true, (40.0, 2e-3, 3e-3)),
     ):
@@ -103,7 +128,12 @@ def test_measurements_have_the_given_errors():
 
 @pytest.mark.parametrize(
     ("sigmas", "runs", "message"),
-    [((1.0, 2.0), 3, "one number or three"), (-1.0, 3, "not negative"), (np.nan, 3, "finite"), (1.0, 0, "runs must be")],
+    [
+        ((1.0, 2.0), 3, "one number or three"),
+        (-1.0, 3, "not negative"),
+        (np.nan, 3, "finite"),
+        (1.0, 0, "runs must be"),
+    ],
 )
 def test_measurements_that_cannot_be_are_refused(sigmas, runs, message):
     with pytest.raises(ValueError, match=message):
@@ -117,7 +147,9 @@ def test_matrices_of_the_kinematic_models():
     T, q, r = 0.7, 3.0, 20.0
     system, _, _ = linear_system(kinematic(T, dimensions=2, order=1, noise_sd=q, measurement_sd=r))
     g = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
-    np.testing.assert_allclose(system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15)
+    np.testing.assert_allclose(
+        system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15
+    )
     np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
     np.testing.assert_allclose(system.R, r**2 * np.eye(2), rtol=1e-15)
     np.testing.assert_array_equal(system.H, np.eye(2, 4))
@@ -125,7 +157,17 @@ def test_matrices_of_the_kinematic_models():
     g = np.array([[T**2 / 2], [T], [1]])
     np.testing.assert_allclose(system.A, [[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]], rtol=1e-15)
     np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
-    assert [s.name for s in kinematic(T, order=2).x] == ["x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az"]
+    assert [s.name for s in kinematic(T, order=2).x] == [
+        "x",
+        "y",
+        "z",
+        "vx",
+        "vy",
+        "vz",
+        "ax",
+        "ay",
+        "az",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -144,14 +186,17 @@ def test_kinematic_models_that_cannot_be_are_refused(change, message):
 
 
 def test_rms_by_part_by_hand():
-    error = np.array([[[3.0, 4.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]], [[2.0, 0.0], [0.0, 6.0]]])  # (3 steps, 2 runs, 2)
+    # (3 steps, 2 runs, 2)
+    error = np.array([[[3.0, 4.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]], [[2.0, 0.0], [0.0, 6.0]]])
     found = rms_by_part(error, np.array([1, 1, 7]))
     first, second = np.sqrt((12.5 + 1) / 2), np.sqrt((4 + 36) / 2)
     assert found.value == pytest.approx([first, second])
     # two numbers a and b: standard deviation |a - b| / sqrt 2, of their mean |a - b| / 2
     assert found.standard_error == pytest.approx([11.5 / 2 / (2 * first), 32 / 2 / (2 * second)])
     assert found.freedom == 1
-    for one, other in zip(rms_difference(error, 0 * error, np.array([1, 1, 7])), found, strict=True):
+    for one, other in zip(
+        rms_difference(error, 0 * error, np.array([1, 1, 7])), found, strict=True
+    ):
         np.testing.assert_array_equal(one, other)
     with pytest.raises(ValueError, match="of the same runs, got 2 and 4"):
         rms_difference(error, np.tile(error, (1, 2, 1)), np.array([1, 1, 7]))
@@ -166,5 +211,7 @@ def test_a_position_has_three_components():
     with pytest.raises(ValueError, match="a range is in m and angles in rad"):
         measure_spherical(aircraft(100.0), 5.0, 1, seed=1)
     for function in (spherical, cartesian):
-        with pytest.raises(ValueError, match=r"three components, \(..., 3\); got the shape \(2, 4\)"):
+        with pytest.raises(
+            ValueError, match=r"three components, \(..., 3\); got the shape \(2, 4\)"
+        ):
             function(np.ones((2, 4)))

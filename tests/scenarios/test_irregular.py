@@ -18,13 +18,20 @@ def test_shares_and_sizes_are_those_asked_for():
         assert abs(found.mean() - share) < 4 * np.sqrt(share * (1 - share) / count)
     error = track.y - track.x[..., :2]
     sigma = float(track.model.parameters["sigma"])
-    for chosen, deviation in ((track.outlier, 10 * sigma), (~track.outlier & ~missing[..., 0], sigma)):
+    for chosen, deviation in (
+        (track.outlier, 10 * sigma),
+        (~track.outlier & ~missing[..., 0], sigma),
+    ):
         square = np.mean(error[chosen] ** 2)
         assert abs(square / deviation**2 - 1) < 4 * np.sqrt(2 / error[chosen].size)
 
 
 def test_a_seed_stands_for_one_track():
-    first, again, other = irregular_track(3, steps=9), irregular_track(3, steps=9), irregular_track(4, steps=9)
+    first, again, other = (
+        irregular_track(3, steps=9),
+        irregular_track(3, steps=9),
+        irregular_track(4, steps=9),
+    )
     np.testing.assert_array_equal(first.y, again.y)
     assert not np.array_equal(first.time, other.time)
 

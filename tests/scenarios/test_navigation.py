@@ -1,4 +1,5 @@
-"""Integrated navigation: exact transitions, sensors with clocks and delays, and the event-driven filter."""
+"""Integrated navigation: exact transitions, sensors with clocks and delays, and the event-driven
+filter."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ from kfcourse.scenarios.navigation import (
 
 pytestmark = pytest.mark.quick
 
-# Position and velocity driven by a known acceleration, with white noise of both; everything non-unit.
+# Position and velocity driven by a known acceleration, with white noise of both; everything
+# non-unit.
 A = np.array([[0.0, 1.0], [-0.04, -0.3]])
 QC = np.array([[0.02, 0.01], [0.01, 0.5]])
 B = np.array([[0.1], [1.3]])
@@ -46,13 +48,27 @@ def inputs_until(duration: float, period: float, runs: int = 1, seed: int = 5) -
 def two_sensors(**timing) -> list[Sensor]:
     return [
         Sensor.define("fast", STATES, "2*V - s + w", variance=0.3, period=0.05, latency=0.01),
-        Sensor.define("slow", STATES, ["s + w1", "s + V + w2"], [[0.5, 0.2], [0.2, 0.8]], 0.4, **timing),
+        Sensor.define(
+            "slow", STATES, ["s + w1", "s + V + w2"], [[0.5, 0.2], [0.2, 0.8]], 0.4, **timing
+        ),
     ]
 
 
-def measured(sensors: list[Sensor], duration: float, runs: int, outputs, seed: int = 1, dynamics=FREE, inputs=None):
+def measured(
+    sensors: list[Sensor],
+    duration: float,
+    runs: int,
+    outputs,
+    seed: int = 1,
+    dynamics=FREE,
+    inputs=None,
+):
     """True states at the outputs, and the messages."""
-    moments = np.unique(np.concatenate([np.asarray(outputs, float), [0.0], *(s.captures(duration) for s in sensors)]))
+    moments = np.unique(
+        np.concatenate(
+            [np.asarray(outputs, float), [0.0], *(s.captures(duration) for s in sensors)]
+        )
+    )
     path = sample(dynamics, PRIOR, moments, runs, seed, inputs)
     return path(np.asarray(outputs, float)), observe(sensors, path, duration, seed + 1)
 
@@ -65,7 +81,9 @@ def test_transition_of_a_double_integrator():
     step = Dynamics([[0, 1], [0, 0]], np.diag([0, q]), [[0], [1]]).over(dt)
     np.testing.assert_allclose(step.A, [[1, dt], [0, 1]], rtol=1e-14)
     np.testing.assert_allclose(step.B, [[dt**2 / 2], [dt]], rtol=1e-14)
-    np.testing.assert_allclose(step.Q, q * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), rtol=1e-14)
+    np.testing.assert_allclose(
+        step.Q, q * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), rtol=1e-14
+    )
 
 
 @pytest.mark.parametrize(
@@ -94,13 +112,18 @@ def test_paths_have_the_moments_of_the_dynamics():
     step = FREE.over(1.8)
     mean, cov = step.A @ PRIOR.mean, step.A @ PRIOR.cov @ step.A.T + step.Q
     last = path.states[-1]
-    # four standard errors: of a mean, sqrt(c_ii / N); of a covariance, sqrt((c_ii c_jj + c_ij^2) / N)
+    # four standard errors: of a mean, sqrt(c_ii / N); of a covariance, sqrt((c_ii c_jj + c_ij^2) /
+    # N)
     assert (np.abs(last.mean(axis=0) - mean) < 4 * np.sqrt(np.diag(cov) / runs)).all()
     bound = 4 * np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / runs)
     assert (np.abs(np.cov(last.T) - cov) < bound).all()
     # ... and jointly: x(2.3) on x(0.8) has the slope exp(A 1.5)
-    slope, residual, *_ = np.linalg.lstsq(path.states[1] - path.states[1].mean(0), last - last.mean(0))
-    errors = np.sqrt(np.outer(np.diag(np.linalg.inv(np.cov(path.states[1].T))), residual / runs) / runs)
+    slope, residual, *_ = np.linalg.lstsq(
+        path.states[1] - path.states[1].mean(0), last - last.mean(0)
+    )
+    errors = np.sqrt(
+        np.outer(np.diag(np.linalg.inv(np.cov(path.states[1].T))), residual / runs) / runs
+    )
     assert (np.abs(slope - FREE.over(1.5).A.T) < 4 * errors).all()
 
 
@@ -127,16 +150,19 @@ def test_clock_is_found_from_pairs():
     fitted = Clock.fit(noisy, readings)
     spread = np.sqrt(np.sum((times - times.mean()) ** 2))
     assert abs(fitted.rate - clock.rate) < 4 * sigma / spread
-    at_end = sigma * np.sqrt(1 / 200 + (600 - times.mean()) ** 2 / spread**2)  # standard error of a regression line
+    # standard error of a regression line
+    at_end = sigma * np.sqrt(1 / 200 + (600 - times.mean()) ** 2 / spread**2)
     assert abs(fitted.time(clock.reading(600.0)) - 600.0) < 4 * at_end
 
 
 def test_captures_are_even_on_the_sensors_own_clock():
     sensor = Sensor.define("a", STATES, "s + w", 1.0, 0.4, offset=0.1, clock=Clock(1.6, -0.3))
     times = sensor.captures(2.0)
-    # readings 0.1 + 0.4 k between -0.3 and 2.9: -0.3, 0.1, ..., 2.9, at the filter's times 0, 0.25, ..., 2
+    # readings 0.1 + 0.4 k between -0.3 and 2.9: -0.3, 0.1, ..., 2.9, at the filter's times 0, 0.25,
+    # ..., 2
     np.testing.assert_allclose(times, 0.25 * np.arange(9), rtol=0, atol=1e-15)
-    # ends that are moments of capture but for rounding: 0.3 / 0.1 < 3, and the reading 0.1 + 0.2 at the start is above 3 * 0.1
+    # ends that are moments of capture but for rounding: 0.3 / 0.1 < 3, and the reading 0.1 + 0.2 at
+    # the start is above 3 * 0.1
     for clock in (Clock(), Clock(shift=0.1 + 0.2)):
         sensor = Sensor.define("b", STATES, "s + w", 1.0, 0.1, clock=clock)
         assert sensor.captures(0.3).tolist() == pytest.approx([0, 0.1, 0.2, 0.3])
@@ -144,9 +170,21 @@ def test_captures_are_even_on_the_sensors_own_clock():
 
 def test_what_is_observed():
     clock = Clock(1 + 1e-3, 0.7)
-    sensor = Sensor.define("a", STATES, "s*(1 + c*w) - V", 4.0, 0.1, parameters={"c": 0.3}, latency=0.2, jitter=0.05, clock=clock)
+    sensor = Sensor.define(
+        "a",
+        STATES,
+        "s*(1 + c*w) - V",
+        4.0,
+        0.1,
+        parameters={"c": 0.3},
+        latency=0.2,
+        jitter=0.05,
+        clock=clock,
+    )
     runs = 2000
-    truth = lambda times: np.broadcast_to(np.stack([2 + times, 0 * times + 0.5], -1)[:, None], (len(times), runs, 2))  # noqa: E731
+    truth = lambda times: np.broadcast_to(  # noqa: E731
+        np.stack([2 + times, 0 * times + 0.5], -1)[:, None], (len(times), runs, 2)
+    )
     messages = observe([sensor], truth, 3.0, seed=6)
     times = np.array([clock.time(m.tag) for m in messages])
     order = np.argsort(times)
@@ -180,9 +218,17 @@ def test_sensor_says_what_is_wrong(timing, message):
 def test_observe_says_what_is_wrong():
     first, second = two_sensors()
     with pytest.raises(ValueError, match="a name of its own"):
-        observe([first, replace(second, name="fast")], lambda times: np.zeros((len(times), 1, 2)), 1.0, 0)
+        observe(
+            [first, replace(second, name="fast")],
+            lambda times: np.zeros((len(times), 1, 2)),
+            1.0,
+            0,
+        )
     with pytest.raises(
-        ValueError, match=re.escape("fast: the truth at 21 moments must have the shape (21, runs, 2), got (21, 2)")
+        ValueError,
+        match=re.escape(
+            "fast: the truth at 21 moments must have the shape (21, runs, 2), got (21, 2)"
+        ),
     ):
         observe([first], lambda times: np.zeros((len(times), 2)), 1.0, 0)
 
@@ -191,7 +237,8 @@ def test_observe_says_what_is_wrong():
 
 
 def slow_filter(messages, sensors, now, inputs=None):
-    """Straight from the page, one run: all that has arrived, in the order of capture, from the prior; filterpy's steps."""
+    """Straight from the page, one run: all that has arrived, in the order of capture, from the
+    prior; filterpy's steps."""
     H = {"fast": np.array([[-1.0, 2.0]]), "slow": np.array([[1.0, 0.0], [1.0, 1.0]])}
     R = {"fast": np.array([[0.3]]), "slow": np.array([[0.5, 0.2], [0.2, 0.8]])}
     clock = {sensor.name: sensor.clock for sensor in sensors}
@@ -207,13 +254,18 @@ def slow_filter(messages, sensors, now, inputs=None):
                 until = inputs.times[i + 1] if i + 1 < len(inputs.times) else np.inf
                 left, right = max(begin, start), min(until, end)
                 if right > left:  # the part of the interval with this value, carried on to the end
-                    held = scipy.linalg.expm(np.block([[A, B], [np.zeros((1, 3))]]) * (right - left))[:2, 2:]
+                    held = scipy.linalg.expm(
+                        np.block([[A, B], [np.zeros((1, 3))]]) * (right - left)
+                    )[:2, 2:]
                     known += scipy.linalg.expm(A * (end - right)) @ held @ value
         one.predict(F=F, Q=F @ loan[:2, 2:])
         one.x = one.x + known
 
     time = 0.0
-    for tag, m in sorted(((clock[m.sensor].time(m.tag), m) for m in messages if m.arrival <= now), key=lambda pair: pair[0]):
+    for tag, m in sorted(
+        ((clock[m.sensor].time(m.tag), m) for m in messages if m.arrival <= now),
+        key=lambda pair: pair[0],
+    ):
         advance(time, tag)
         one.dim_z = len(H[m.sensor])
         one.update(m.value[0], R=R[m.sensor], H=H[m.sensor])
@@ -224,7 +276,8 @@ def slow_filter(messages, sensors, now, inputs=None):
 
 @pytest.mark.parametrize("with_inputs", [False, True])
 def test_late_measurements_are_used_as_on_the_page(with_inputs):
-    """Delays up to three times the slow sensor's period, an own clock, outputs between everything."""
+    """Delays up to three times the slow sensor's period, an own clock, outputs between
+    everything."""
     sensors = two_sensors(latency=0.3, jitter=0.9, clock=Clock(1.003, 0.7))
     dynamics, inputs = (DRIVEN, inputs_until(5.0, 0.13)) if with_inputs else (FREE, None)
     outputs = np.sort(np.random.default_rng(8).uniform(0, 4.5, 25))
@@ -242,7 +295,8 @@ def test_late_measurements_are_used_as_on_the_page(with_inputs):
 
 
 def test_the_covariance_is_right_by_tag_and_wrong_by_arrival():
-    """Three sensors, one nonlinear, late and on clocks of their own: mean NEES 2 over independent runs."""
+    """Three sensors, one nonlinear, late and on clocks of their own: mean NEES 2 over independent
+    runs."""
     runs = 1000
     sensors = [
         *two_sensors(latency=0.8, clock=Clock(1.01, 0.2)),
@@ -265,26 +319,50 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"observations": [GOOD._replace(sensor="gyro")]}, "'gyro', but the filter knows only fast, slow"),
-        ({"observations": [GOOD._replace(tag=np.nan)]}, "fast: tag and arrival must be finite, got nan and 1.1"),
-        ({"observations": [GOOD._replace(arrival=0.9)]}, "captured at t = 1 s by its tag, but arrived before that, at 0.9 s"),
-        ({"observations": [GOOD._replace(tag=-0.5)]}, "captured at t = -0.5 s, before the prior's 0 s"),
-        ({"observations": [GOOD._replace(value=np.zeros((3, 2)))]}, "must have the shape (runs, 1), got (3, 2)"),
+        (
+            {"observations": [GOOD._replace(sensor="gyro")]},
+            "'gyro', but the filter knows only fast, slow",
+        ),
+        (
+            {"observations": [GOOD._replace(tag=np.nan)]},
+            "fast: tag and arrival must be finite, got nan and 1.1",
+        ),
+        (
+            {"observations": [GOOD._replace(arrival=0.9)]},
+            "captured at t = 1 s by its tag, but arrived before that, at 0.9 s",
+        ),
+        (
+            {"observations": [GOOD._replace(tag=-0.5)]},
+            "captured at t = -0.5 s, before the prior's 0 s",
+        ),
+        (
+            {"observations": [GOOD._replace(value=np.zeros((3, 2)))]},
+            "must have the shape (runs, 1), got (3, 2)",
+        ),
         ({"observations": [GOOD._replace(value=np.full((3, 1), np.inf))]}, "finite, or NaN"),
-        ({"observations": [GOOD, GOOD._replace(value=np.zeros((2, 1)))]}, "different numbers of runs: [2, 3]"),
+        (
+            {"observations": [GOOD, GOOD._replace(value=np.zeros((2, 1)))]},
+            "different numbers of runs: [2, 3]",
+        ),
         ({"observations": [GOOD], "depth": 0.08}, "remembers only 0.08 s; give depth=0.1 or more"),
         ({"times": [2.0, 1.0]}, "ascending"),
         ({"times": [0.5], "start": 1.0}, "wanted at t = 0.5 s, before the prior's 1 s"),
         ({"by": "tags"}, 'by "tag" or by "arrival", not by \'tags\''),
         ({"sensors": [two_sensors()[0]] * 2}, "a name of its own"),
-        ({"prior": Gaussian(np.zeros(3), np.eye(3))}, "prior's mean must have the shape (2,) or (1, 2), got (3,)"),
+        (
+            {"prior": Gaussian(np.zeros(3), np.eye(3))},
+            "prior's mean must have the shape (2,) or (1, 2), got (3,)",
+        ),
         (
             {"sensors": [Sensor.define("short", ["s"], "s + w", 1.0)]},
             "short was defined with 1 state component(s)",
         ),
         ({"depth": -1.0}, "expected a number not below 0, got -1.0"),
         ({"dynamics": DRIVEN}, "have 1 known input(s); give them"),
-        ({"inputs": inputs_until(3.0, 0.1)}, "inputs must have the shape (31, runs or 1, 0), got (31, 1, 1)"),
+        (
+            {"inputs": inputs_until(3.0, 0.1)},
+            "inputs must have the shape (31, runs or 1, 0), got (31, 1, 1)",
+        ),
         (
             {"dynamics": DRIVEN, "inputs": Inputs(np.array([0.5]), np.zeros((1, 1, 1)))},
             "begin at t = 0.5 s, but are needed from t = 0 s",
@@ -292,12 +370,19 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
     ],
 )
 def test_fuse_says_what_is_wrong(changes, message):
-    arguments = {"dynamics": FREE, "sensors": two_sensors(), "prior": PRIOR, "observations": [], "times": [2.0]} | changes
+    arguments = {
+        "dynamics": FREE,
+        "sensors": two_sensors(),
+        "prior": PRIOR,
+        "observations": [],
+        "times": [2.0],
+    } | changes
     with pytest.raises(ValueError, match=re.escape(message)):
         fuse(**arguments)
 
 
-# ---------------------------------------------------------------- recorded data: innovations, no period
+# ---------------------------------------------------------------- recorded data: innovations, no
+# period
 
 
 def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_same():
@@ -306,21 +391,28 @@ def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_
     told = follow(FREE, sensors, PRIOR, messages, times)
     np.testing.assert_array_equal(told.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean)
     ordered = sorted(messages, key=lambda message: message.tag)
-    assert [(one.sensor, one.time) for one in told.innovations] == [(m.sensor, pytest.approx(m.tag)) for m in ordered]
+    assert [(one.sensor, one.time) for one in told.innovations] == [
+        (m.sensor, pytest.approx(m.tag)) for m in ordered
+    ]
     meters = {"fast": ([[-1, 2]], [[0.3]]), "slow": ([[1, 0], [1, 1]], [[0.5, 0.2], [0.2, 0.8]])}
     for last in (0, 5, -1):  # each is what the estimate of all that was captured before leaves
         now, found = ordered[last], told.innovations[last]
         earlier = [m._replace(arrival=m.tag) for m in ordered if m.tag < now.tag]
         before = fuse(FREE, sensors, PRIOR, earlier, [now.tag])
         H, R = map(np.array, meters[now.sensor])
-        np.testing.assert_allclose(found.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(
+            found.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING
+        )
         cov = np.broadcast_to(H @ before.cov[0, :1] @ H.T + R, found.cov.shape)
         np.testing.assert_allclose(found.cov, cov, rtol=0, atol=ROUNDING)
 
 
 def test_a_recorded_sensor_needs_no_period():
     given, free = (Sensor.define("s", STATES, "s + w", 0.5, *period) for period in ([0.25], []))
-    messages = [Observation("s", tag, tag, np.array([[value]])) for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))]
+    messages = [
+        Observation("s", tag, tag, np.array([[value]]))
+        for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))
+    ]
     laws = [fuse(FREE, [one], PRIOR, messages, np.array([1.0])) for one in (given, free)]
     np.testing.assert_array_equal(laws[0].mean, laws[1].mean)
     with pytest.raises(ValueError, match="s has no period, as a recorded sensor"):
@@ -328,7 +420,8 @@ def test_a_recorded_sensor_needs_no_period():
 
 
 @pytest.mark.parametrize(
-    ("times", "readings"), [([0, 1, 2], [9, 7, 5]), ([1, 1, 1], [1, 2, 3]), ([1, np.nan, 3], [1, 2, 3]), ([1], [1])]
+    ("times", "readings"),
+    [([0, 1, 2], [9, 7, 5]), ([1, 1, 1], [1, 2, 3]), ([1, np.nan, 3], [1, 2, 3]), ([1], [1])],
 )
 def test_no_clock_runs_backwards(times, readings):
     with pytest.raises(ValueError, match="readings"):

@@ -1,4 +1,5 @@
-"""The pointer's track, the model of uniformly accelerated motion, the start-up from three samples."""
+"""The pointer's track, the model of uniformly accelerated motion, the start-up from three
+samples."""
 
 import numpy as np
 import pytest
@@ -27,7 +28,8 @@ def test_the_matrices_are_those_of_the_paper():
     np.testing.assert_allclose(one.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
     np.testing.assert_allclose(one.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
     np.testing.assert_allclose(one.R, 9 * np.eye(2), rtol=1e-15)
-    # Covariance of what a random acceleration (ax, ay), constant in the interval, does to (x, y, vx, vy).
+    # Covariance of what a random acceleration (ax, ay), constant in the interval, does to (x, y,
+    # vx, vy).
     effect = G @ np.array([[1, 0], [0, 1], [1, 0], [0, 1]])
     np.testing.assert_allclose(one.Q, sd**2 * effect @ effect.T, rtol=1e-13)
 
@@ -43,7 +45,9 @@ def test_the_start_up_is_the_parabola_through_three_samples():
     for run in range(5):
         for axis in range(2):
             c2, c1, c0 = np.polyfit(t, y[:, run, axis], 2)
-            np.testing.assert_allclose(law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11)
+            np.testing.assert_allclose(
+                law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11
+            )
 
 
 # ---------------------------------------------------------------- the filter
@@ -62,7 +66,11 @@ def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly(arithme
     np.testing.assert_allclose(laws.predicted.mean, truth[3:], rtol=1e-11)
     # Without the input the first prediction misses by B a, and the filter lags.
     without = follow(uniform_acceleration(dt, 100.0, 2.0), position, dt, arithmetic=arithmetic)
-    np.testing.assert_allclose((truth[3:] - without.predicted.mean)[0, 0], np.concatenate([a * dt**2 / 2, a * dt]), rtol=1e-9)
+    np.testing.assert_allclose(
+        (truth[3:] - without.predicted.mean)[0, 0],
+        np.concatenate([a * dt**2 / 2, a * dt]),
+        rtol=1e-9,
+    )
 
 
 # ---------------------------------------------------------------- the track
@@ -76,7 +84,9 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     assert (np.hypot(*track.displacement.T) >= SHORTEST).all()
     before, after = track.at(np.array(-1.0)), track.at(np.array(track.end + 1))
     np.testing.assert_allclose(before.position, track.origin, rtol=1e-12)
-    np.testing.assert_allclose(after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(
+        after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12
+    )
     for motion in (before, after):
         assert not motion.velocity.any() and not motion.acceleration.any()
 
@@ -103,8 +113,14 @@ def test_arguments_that_do_not_fit():
     missing = y.copy()
     missing[1, 0, 0] = np.nan
     for call, message in (
-        (lambda: uniform_acceleration(0.1, -1.0, 1.0), "acceleration_sd must be finite and not negative"),
-        (lambda: uniform_acceleration(0.1, 1.0, np.nan), "measurement_sd must be finite and not negative"),
+        (
+            lambda: uniform_acceleration(0.1, -1.0, 1.0),
+            "acceleration_sd must be finite and not negative",
+        ),
+        (
+            lambda: uniform_acceleration(0.1, 1.0, np.nan),
+            "measurement_sd must be finite and not negative",
+        ),
         (lambda: start_up(y, 0.1, np.eye(2)), "three samples of two coordinates"),
         (lambda: start_up(missing[:3], 0.1, np.eye(2)), "wait for three complete samples"),
         (lambda: follow(system, missing, 0.1), "wait for three complete samples"),
@@ -112,9 +128,15 @@ def test_arguments_that_do_not_fit():
         (lambda: acceleration_from(y[:2], 0.1), "takes three samples"),
         (lambda: hand_track(1, strokes=0), "strokes must be a positive whole number"),
         (lambda: hand_track(1, screen=(100.0, 500.0)), "at least 100 px long"),
-        (lambda: sample(hand_track(1), 0.1, -1.0, 1, 0), "measurement_sd must be finite and not negative"),
+        (
+            lambda: sample(hand_track(1), 0.1, -1.0, 1, 0),
+            "measurement_sd must be finite and not negative",
+        ),
         (lambda: sample(hand_track(1), 0.1, 1.0, 0, 0), "runs must be a positive whole number"),
-        (lambda: follow(system, y, 0.2), "made for an interval of 0.1 s, and the samples have 0.2 s"),
+        (
+            lambda: follow(system, y, 0.2),
+            "made for an interval of 0.1 s, and the samples have 0.2 s",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             call()

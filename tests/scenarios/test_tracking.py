@@ -1,4 +1,5 @@
-"""The Kalman filter of the radar chapters against one written step by step, and the start against what it promises."""
+"""The Kalman filter of the radar chapters against one written step by step, and the start against
+what it promises."""
 
 from __future__ import annotations
 
@@ -17,7 +18,10 @@ T, SIGMA = 0.8, 100.0
 @pytest.mark.parametrize("control", [False, True])
 def test_positions_step_by_step(control):
     rng = np.random.default_rng(1)
-    y, start = rng.normal(size=(6, 2, 3)), Gaussian(rng.normal(size=(2, 6)), np.diag([2.0, 3, 1, 4, 1, 5]))
+    y, start = (
+        rng.normal(size=(6, 2, 3)),
+        Gaussian(rng.normal(size=(2, 6)), np.diag([2.0, 3, 1, 4, 1, 5])),
+    )
     A = np.kron([[1, T], [0, 1]], np.eye(3))
     B, H = np.kron([[T**2 / 2], [T]], np.eye(3)), np.kron([[1, 0]], np.eye(3))
     expected = np.empty((6, 2, 3))
@@ -27,7 +31,11 @@ def test_positions_step_by_step(control):
             K = Psi @ H.T @ np.linalg.inv(H @ Psi @ H.T + 4.0 * np.eye(3))
             z, p = lam + K @ (y[k, i] - H @ lam), Psi - K @ H @ Psi
             expected[k, i] = z[:3]
-            u = (y[k, i] - 2 * y[k - 1, i] + y[k - 2, i]) / T**2 if control and k >= 2 else np.zeros(3)
+            u = (
+                (y[k, i] - 2 * y[k - 1, i] + y[k - 2, i]) / T**2
+                if control and k >= 2
+                else np.zeros(3)
+            )
             lam, Psi = A @ z + B @ u, A @ p @ A.T + 0.25 * B @ B.T
     found = kalman_positions(y, T, 0.5, 2.0, start, control)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)  # rounding
@@ -42,7 +50,9 @@ def test_a_rough_start_has_the_gain_that_is_asked_for_and_spreads_as_it_says():
     error = (law.mean - state) / sd
     assert (np.abs(error.mean(axis=0)) < 4 / np.sqrt(20_000)).all()
     # a sample correlation scatters by at most 1 / sqrt(runs)
-    np.testing.assert_allclose(np.corrcoef(error.T), law.cov / np.outer(sd, sd), atol=4 / np.sqrt(20_000))
+    np.testing.assert_allclose(
+        np.corrcoef(error.T), law.cov / np.outer(sd, sd), atol=4 / np.sqrt(20_000)
+    )
 
 
 @pytest.mark.parametrize("gain", [0.3, 1.0])

@@ -46,7 +46,9 @@ def ensemble():
 
 
 def reference(expression, x, p):
-    return sp.lambdify([x1, x2, p11, p12, p22], expression)(x[:, 0], x[:, 1], p[:, 0, 0], p[:, 0, 1], p[:, 1, 1])
+    return sp.lambdify([x1, x2, p11, p12, p22], expression)(
+        x[:, 0], x[:, 1], p[:, 0, 0], p[:, 0, 1], p[:, 1, 1]
+    )
 
 
 @pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
@@ -55,36 +57,49 @@ def test_generated_code_equals_lambdify(expression, ensemble):
     found = code.function(*ensemble)[0]
     assert found.shape == (50, 1)
     # A few roundings each; the conditioning of these expressions at these points is below 1e3.
-    np.testing.assert_allclose(found[:, 0], reference(expression, *ensemble), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        found[:, 0], reference(expression, *ensemble), rtol=1e-12, atol=1e-12
+    )
 
 
 def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
     count = len(EXPRESSIONS) // 2
     together = sp.Matrix(count, 2, EXPRESSIONS[: 2 * count])
-    found = compile_function("f", ARGUMENTS, {"value": together, "first": together[:, 0]}, ["x", "first"]).function(*ensemble)
+    found = compile_function(
+        "f", ARGUMENTS, {"value": together, "first": together[:, 0]}, ["x", "first"]
+    ).function(*ensemble)
     assert found[0].shape == (50, count, 2)
     for i in range(count):
         np.testing.assert_allclose(found[1][:, i], found[0][:, i, 0], rtol=0, atol=0)
         for j in range(2):
-            np.testing.assert_allclose(found[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(
+                found[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12
+            )
 
 
 def test_small_integer_powers_are_products():
-    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix([x1**2 - 3 * x2**7 / 5, p11**-3 * x1])}, ["x", "value"])
+    code = compile_function(
+        "f", ARGUMENTS, {"value": sp.Matrix([x1**2 - 3 * x2**7 / 5, p11**-3 * x1])}, ["x", "value"]
+    )
     assert "**" not in code.source.replace("**(-1.0)", "")  # a reciprocal is quick
 
 
 def test_what_models_share_is_compiled_once():
-    """Models that differ in a number of the object, as modes do and the steps of a search, have one meter."""
+    """Models that differ in a number of the object, as modes do and the steps of a search, have one
+    meter."""
     meter = "x*exp(-x**2) + 0.017*w"
-    first, second = (linearised(Model.define("c*x + v", meter, {"c": c})).formulas for c in (0.71, 0.72))
+    first, second = (
+        linearised(Model.define("c*x + v", meter, {"c": c})).formulas for c in (0.71, 0.72)
+    )
     assert first.compiled_measure.compiled is second.compiled_measure.compiled
     assert first.compiled_predict.compiled is not second.compiled_predict.compiled
 
 
 def test_leading_axes_broadcast(ensemble):
     x, p = ensemble
-    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix([x1 * p11, x2 - p12])}, ["x", "value"]).function
+    code = compile_function(
+        "f", ARGUMENTS, {"value": sp.Matrix([x1 * p11, x2 - p12])}, ["x", "value"]
+    ).function
     expected = code(x, np.broadcast_to(p[0], p.shape))[0]
     np.testing.assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
     np.testing.assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
@@ -93,20 +108,28 @@ def test_leading_axes_broadcast(ensemble):
 
 def test_one_trajectory_gets_the_numbers_it_gets_in_an_ensemble(ensemble):
     x, p = ensemble
-    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix(EXPRESSIONS[:4])}, ["x", "value"]).function
+    code = compile_function(
+        "f", ARGUMENTS, {"value": sp.Matrix(EXPRESSIONS[:4])}, ["x", "value"]
+    ).function
     for i in (0, 17):
         # numpy's vectorised sine and exponential may differ from their scalar loops in the last bit
-        np.testing.assert_allclose(code(x[i : i + 1], p[i : i + 1])[0], code(x, p)[0][i : i + 1], rtol=1e-14)
+        np.testing.assert_allclose(
+            code(x[i : i + 1], p[i : i + 1])[0], code(x, p)[0][i : i + 1], rtol=1e-14
+        )
 
 
-@pytest.mark.parametrize("constant", [sp.Rational(9, 10), sp.S.Zero, sp.sqrt(2) * sp.exp(1), 2 ** sp.Rational(1, 4)])
+@pytest.mark.parametrize(
+    "constant", [sp.Rational(9, 10), sp.S.Zero, sp.sqrt(2) * sp.exp(1), 2 ** sp.Rational(1, 4)]
+)
 def test_a_constant_output_is_one_value_for_all(constant, ensemble):
     outputs = {
         "vector": sp.Matrix([constant]),
         "matrix": sp.Matrix([[constant, 0], [0, constant]]),
         "other": sp.Matrix([constant + x1]),
     }
-    vector, matrix, other = compile_function("f", ARGUMENTS, outputs, ["x", "vector", "other"]).function(*ensemble)
+    vector, matrix, other = compile_function(
+        "f", ARGUMENTS, outputs, ["x", "vector", "other"]
+    ).function(*ensemble)
     np.testing.assert_allclose(vector, np.array([float(constant)]), rtol=1e-15)
     np.testing.assert_allclose(matrix, float(constant) * np.eye(2), rtol=1e-15)
     assert vector.shape == (1,)
@@ -115,7 +138,8 @@ def test_a_constant_output_is_one_value_for_all(constant, ensemble):
 
 
 def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
-    """A vector is one for each trajectory; what a matrix is made of may come by way of what is found once for several entries."""
+    """A vector is one for each trajectory; what a matrix is made of may come by way of what is
+    found once for several entries."""
     x, p = ensemble
     both = sp.sin(p11) * sp.exp(p12)
     outputs = {
@@ -134,16 +158,20 @@ def test_no_symbol_can_hide_another(name, ensemble):
     # Names in the formula never reach the code as they are.
     odd = sp.Symbol(name, real=True)
     arguments = {"x": sp.Matrix([odd, x2])}
-    found = compile_function("f", arguments, {"value": sp.Matrix([odd**2 + sp.sin(odd) + x2])}, ["x", "value"]).function(
-        ensemble[0]
-    )[0]
+    found = compile_function(
+        "f", arguments, {"value": sp.Matrix([odd**2 + sp.sin(odd) + x2])}, ["x", "value"]
+    ).function(ensemble[0])[0]
     first, second = ensemble[0].T
-    np.testing.assert_allclose(found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(
+        found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14
+    )
 
 
 def compiled(*expressions):
     x, y = symbol("x"), symbol("y")
-    return compile_function("f", {"x": sp.Matrix([x, y])}, {"o": sp.Matrix(expressions)}, ["x", "o"])
+    return compile_function(
+        "f", {"x": sp.Matrix([x, y])}, {"o": sp.Matrix(expressions)}, ["x", "o"]
+    )
 
 
 def test_largest_and_smallest_of_many():
@@ -155,8 +183,12 @@ def test_largest_and_smallest_of_many():
 
 
 def test_special_functions_are_scipys():
-    found = compiled(sp.erf(symbol("x")), sp.loggamma(symbol("x"))).function(np.array([[0.5, 0.0], [2.0, 0.0]]))[0]
-    np.testing.assert_allclose(found, [[math.erf(x), math.lgamma(x)] for x in (0.5, 2.0)], rtol=1e-14)
+    found = compiled(sp.erf(symbol("x")), sp.loggamma(symbol("x"))).function(
+        np.array([[0.5, 0.0], [2.0, 0.0]])
+    )[0]
+    np.testing.assert_allclose(
+        found, [[math.erf(x), math.lgamma(x)] for x in (0.5, 2.0)], rtol=1e-14
+    )
 
 
 @pytest.mark.parametrize(

@@ -274,7 +274,13 @@ for formula in json.load(sys.stdin):
 def test_no_formula_takes_a_second_to_read_or_refuse():
     # In a process of its own, so that a formula that never ends is a failure, not a hanging test.
     try:
-        done = subprocess.run([sys.executable, "-c", TIMER], input=json.dumps(BOMBS), capture_output=True, text=True, timeout=20)
+        done = subprocess.run(
+            [sys.executable, "-c", TIMER],
+            input=json.dumps(BOMBS),
+            capture_output=True,
+            text=True,
+            timeout=20,
+        )
         output, error = done.stdout, done.stderr
     except subprocess.TimeoutExpired as expired:
         output, error = (expired.stdout or b"").decode(), "timeout"
@@ -291,7 +297,25 @@ def test_an_ordinary_word_names_a_symbol(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["", "1x", "_x", "x y", "x-y", "lambda", "if", "None", "sin", "pi", "ξ", "x" * 40, "__class__", "x\n", 3, None]
+    "name",
+    [
+        "",
+        "1x",
+        "_x",
+        "x y",
+        "x-y",
+        "lambda",
+        "if",
+        "None",
+        "sin",
+        "pi",
+        "ξ",
+        "x" * 40,
+        "__class__",
+        "x\n",
+        3,
+        None,
+    ],
 )
 def test_other_words_do_not(name):
     with pytest.raises(ValueError, match=r"cannot name|reserved word|already means"):

@@ -1,4 +1,5 @@
-"""The JavaScript printer: what it has not it refuses in words; tests/pages/test_browser.py runs what it prints."""
+"""The JavaScript printer: what it has not it refuses in words; tests/pages/test_browser.py runs
+what it prints."""
 
 import pytest
 import sympy as sp
@@ -29,13 +30,21 @@ def test_a_function_in_full():
 def test_entries_of_vectors_and_what_is_written_in_place():
     text = javascript.loop("turn", {"p": sp.Matrix([x, y])}, {"p": sp.Matrix([y, x])})
     # all is read before anything is written
-    assert text.index("= a.p[2 * i + 1]") < text.index("= a.p[2 * i + 0]") < text.index("a.p[2 * i + 0] = ")
+    assert (
+        text.index("= a.p[2 * i + 1]")
+        < text.index("= a.p[2 * i + 0]")
+        < text.index("a.p[2 * i + 0] = ")
+    )
 
 
 @pytest.mark.parametrize(
     ("formula", "said"),
     [
-        (sp.erf(x), r"erf, in erf\(x\), is nothing that the pages' JavaScript knows; it has Abs, .* tanh, and powers"),
+        (
+            sp.erf(x),
+            r"erf, in erf\(x\), is nothing that the pages' JavaScript knows; it has Abs, .* tanh, "
+            r"and powers",
+        ),
         (sp.gamma(x) + x, r"gamma, in gamma\(x\)"),
         (sp.Integral(sp.exp(-(x**2)), (x, 0, 1)), "Integral"),
         (sp.Sum(x, (y, 1, 3)), "Sum"),

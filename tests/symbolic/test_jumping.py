@@ -14,16 +14,26 @@ MODES = {"sound": {"parameters": {"C": 1}}, "faulty": {"parameters": {"C": 10}}}
 
 def define(**changes):
     given = {"modes": MODES, "transition": [[0.9, 0.1], [0.3, 0.7]], "first": [0.8, 0.2]} | changes
-    return JumpModel.define(given.pop("state", "0.9*x + v"), "x + C*w", given.pop("parameters", None), **given)
+    return JumpModel.define(
+        given.pop("state", "0.9*x + v"), "x + C*w", given.pop("parameters", None), **given
+    )
 
 
 def test_a_mode_is_a_model_of_what_holds_for_all_and_of_what_differs():
     model = JumpModel.define(
-        "c*x + v", "x + C*w", {"c": 0.5, "C": 1}, prior={"mean": 2},
-        modes={"a": {}, "b": {"state": "c*x + 3 + v", "parameters": {"C": 7}, "state_noise": {"variance": 4}}},
+        "c*x + v",
+        "x + C*w",
+        {"c": 0.5, "C": 1},
+        prior={"mean": 2},
+        modes={
+            "a": {},
+            "b": {"state": "c*x + 3 + v", "parameters": {"C": 7}, "state_noise": {"variance": 4}},
+        },
         transition=[0.5, 0.5],
-    )  # fmt: skip
-    assert model.modes[0] == Model.define("c*x + v", "x + C*w", {"c": 0.5, "C": 1}, prior={"mean": 2})
+    )
+    assert model.modes[0] == Model.define(
+        "c*x + v", "x + C*w", {"c": 0.5, "C": 1}, prior={"mean": 2}
+    )
     assert model.modes[1] == Model.define("c*x + 3 + v", "x + C*w", {"c": 0.5, "C": 7})
     assert model.modes[1].state_noise.cov == 4 and model.prior.mean == 2
     assert (model.n, model.p, model.names) == (1, 1, ("a", "b"))
@@ -38,9 +48,13 @@ def test_a_single_row_is_a_mode_drawn_anew_at_each_step():
 
 
 def test_the_chain_may_depend_on_time_and_parameters():
-    model = define(transition=[["1 - e/(k + 1)", "e/(k + 1)"], ["1", 0]], parameters={"e": 0.5}, interval=0.1)
+    model = define(
+        transition=[["1 - e/(k + 1)", "e/(k + 1)"], ["1", 0]], parameters={"e": 0.5}, interval=0.1
+    )
     for k in (0, 3, 49):
-        np.testing.assert_allclose(model.transition_at(k), [[1 - 0.5 / (k + 1), 0.5 / (k + 1)], [1, 0]], rtol=1e-14)
+        np.testing.assert_allclose(
+            model.transition_at(k), [[1 - 0.5 / (k + 1), 0.5 / (k + 1)], [1, 0]], rtol=1e-14
+        )
     law = model.first
     for k in range(5):
         np.testing.assert_allclose(model.law_at(k), law, rtol=1e-12)
@@ -58,15 +72,20 @@ def test_a_chain_without_time_has_the_law_of_its_powers():
 def test_trajectories_follow_the_chain_and_the_mode_in_force():
     """x_{k+1} by the mode of step k + 1, y_k by that of step k."""
     model = JumpModel.define(
-        "0.5*x + r + v", "x + b + 0.1*w", {"r": 0.0, "b": 0.0},
+        "0.5*x + r + v",
+        "x + b + 0.1*w",
+        {"r": 0.0, "b": 0.0},
         modes={
             "a": {},
             "b": {
-                "parameters": {"r": 100, "b": -1000}, "state_noise": {"variance": 9}, "meter_noise": {"mean": 5, "variance": 4},
+                "parameters": {"r": 100, "b": -1000},
+                "state_noise": {"variance": 9},
+                "meter_noise": {"mean": 5, "variance": 4},
             },
         },
-        transition=[[0.9, 0.1], [0.3, 0.7]], first=[0.8, 0.2],
-    )  # fmt: skip
+        transition=[[0.9, 0.1], [0.3, 0.7]],
+        first=[0.8, 0.2],
+    )
     runs = 20_000
     x, y, mode = simulate(model, runs, 6, seed=1)
     mode = mode.astype(int)
@@ -97,7 +116,10 @@ def test_the_same_seed_gives_the_same_modes():
 
 
 def test_averaged_equations():
-    model = define(state="0.9*x + v", modes={"a": {"parameters": {"C": 1}}, "b": {"state": "x**2 + v", "parameters": {"C": 2}}})
+    model = define(
+        state="0.9*x + v",
+        modes={"a": {"parameters": {"C": 1}}, "b": {"state": "x**2 + v", "parameters": {"C": 2}}},
+    )
     state, meter = averaged_equations(model)
     x = np.array([[2.0], [3.0]])
     law = model.law_at(3)
@@ -108,25 +130,64 @@ def test_averaged_equations():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"transition": [[0.9, 0.2], [0.3, 0.7]]}, "`transition` at step 0: row 1 sums to 1.1, not to 1"),
+        (
+            {"transition": [[0.9, 0.2], [0.3, 0.7]]},
+            "`transition` at step 0: row 1 sums to 1.1, not to 1",
+        ),
         ({"transition": [[0.9, 0.1], [1.3, -0.3]]}, "row 2 has an entry that is no probability"),
         ({"transition": [[0.9, "0.1*k"], [0.3, 0.7]]}, "`transition` at step 0: row 1 sums to 0.9"),
-        ({"transition": [["1 - sqrt(k - 3)", "sqrt(k - 3)"], [0.3, 0.7]]}, "at step 0: row 1 has an entry that is no"),
+        (
+            {"transition": [["1 - sqrt(k - 3)", "sqrt(k - 3)"], [0.3, 0.7]]},
+            "at step 0: row 1 has an entry that is no",
+        ),
         ({"transition": [[1.0]]}, "must be 2 rows of 2 probabilities for 2 mode"),
         ({"transition": "0.9"}, "must be 2 rows of 2 probabilities"),
         ({"transition": [[0.9, 0.1], 0.3]}, "must be 2 rows of 2 probabilities"),
-        ({"transition": [[0.9, True], [0.3, 0.7]]}, "^`transition`: an entry = True: expected a finite number"),
+        (
+            {"transition": [[0.9, True], [0.3, 0.7]]},
+            "^`transition`: an entry = True: expected a finite number",
+        ),
         ({"first": [0.8, 0.3]}, "`first`: the row sums to 1.1"),
         ({"first": [1.0]}, "`first` must be 2 probabilities"),
         ({"first": "often"}, "`first` must be 2 probabilities"),
         ({"first": None}, "`first` is missing"),
         ({"modes": {}}, "`modes` must be a table of modes by name"),
-        ({"modes": MODES | {"odd": {"prior": {"mean": 1}}}}, "mode odd: modes may differ in state, meter, .* not in prior"),
+        (
+            {"modes": MODES | {"odd": {"prior": {"mean": 1}}}},
+            "mode odd: modes may differ in state, meter, .* not in prior",
+        ),
         ({"modes": MODES | {"odd": 3}}, "`modes.odd` must be a table"),
-        ({"modes": {"sound": MODES["sound"], "odd": {"state": ["x1 + v", "x2"], "parameters": {"C": 1}}}}, "mode odd"),
-        ({"modes": {"sound": MODES["sound"], "odd": {"meter": ["x + w", "x"], "parameters": {"C": 1}}}}, "measurement component"),
-        ({"modes": {"sound": MODES["sound"], "odd": {"meter": "x + w1 + w2"}}}, "as many noise.*name them all by `symbols`"),
-        ({"modes": {"sound": MODES["sound"], "odd": {"meter": "x + w", "parameters": {"C": "much"}}}}, "mode odd: parameter C"),
+        (
+            {
+                "modes": {
+                    "sound": MODES["sound"],
+                    "odd": {"state": ["x1 + v", "x2"], "parameters": {"C": 1}},
+                }
+            },
+            "mode odd",
+        ),
+        (
+            {
+                "modes": {
+                    "sound": MODES["sound"],
+                    "odd": {"meter": ["x + w", "x"], "parameters": {"C": 1}},
+                }
+            },
+            "measurement component",
+        ),
+        (
+            {"modes": {"sound": MODES["sound"], "odd": {"meter": "x + w1 + w2"}}},
+            "as many noise.*name them all by `symbols`",
+        ),
+        (
+            {
+                "modes": {
+                    "sound": MODES["sound"],
+                    "odd": {"meter": "x + w", "parameters": {"C": "much"}},
+                }
+            },
+            "mode odd: parameter C",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(changes, message):
@@ -135,7 +196,8 @@ def test_what_does_not_fit_is_refused_in_words(changes, message):
 
 
 def test_a_formula_of_the_chain_that_cannot_be_read_is_pointed_at():
-    with pytest.raises(ModelError, match=r"`transition`: .*unknown symbol 'v'"):  # the chain does not know the noises
+    # the chain does not know the noises
+    with pytest.raises(ModelError, match=r"`transition`: .*unknown symbol 'v'"):
         define(transition=[["1 - v", "v"], [0.3, 0.7]])
     with pytest.raises(ModelError, match="unknown symbol 'C'"):  # it differs between the modes
         define(transition=[["1 - C/9", "C/9"], [0.3, 0.7]])
@@ -156,7 +218,9 @@ def test_a_chain_that_fails_late_says_so_when_it_comes_there():
 def test_tables():
     plain = {"state": "0.9*x + v", "meter": "x + w"}
     assert isinstance(model_of_table(plain), Model)
-    assert isinstance(model_of_table(plain | {"title": "t", "modes": {"a": {}}, "transition": [1]}), JumpModel)
+    assert isinstance(
+        model_of_table(plain | {"title": "t", "modes": {"a": {}}, "transition": [1]}), JumpModel
+    )
     for change, message in (
         ({"first": [1]}, "`first` is of a model with `modes`"),
         ({"modes": {"a": {}}}, "needs `transition`"),

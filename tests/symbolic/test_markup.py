@@ -12,7 +12,12 @@ pytestmark = pytest.mark.quick
 def shown(latex):
     """The text with a | for every thin space."""
     text = mathml(latex, "inline").replace('<mspace width="0.167em" />', "|")
-    return re.sub(r"<[^>]*>", "", text).replace("&#x00028;", "(").replace("&#x00029;", ")").replace("&#x0002B;", "+")
+    return (
+        re.sub(r"<[^>]*>", "", text)
+        .replace("&#x00028;", "(")
+        .replace("&#x00029;", ")")
+        .replace("&#x0002B;", "+")
+    )
 
 
 @pytest.mark.parametrize(

@@ -34,8 +34,14 @@ def test_laws_are_standard_normal_by_default():
 
 
 def test_a_variance_is_a_number_a_list_or_a_matrix():
-    for variance, expected in ((2, [[2, 0], [0, 2]]), ([2, 3], [[2, 0], [0, 3]]), ([[2, 1], [1, 3]], [[2, 1], [1, 3]])):
-        model = Model.define(["x1 + v", "x2"], "x1 + w", prior={"mean": [1, 2], "variance": variance})
+    for variance, expected in (
+        (2, [[2, 0], [0, 2]]),
+        ([2, 3], [[2, 0], [0, 3]]),
+        ([[2, 1], [1, 3]], [[2, 1], [1, 3]]),
+    ):
+        model = Model.define(
+            ["x1 + v", "x2"], "x1 + w", prior={"mean": [1, 2], "variance": variance}
+        )
         assert np.array_equal(model.prior.cov, expected)
         assert np.array_equal(model.prior.mean, [1, 2])
 
@@ -64,11 +70,16 @@ def test_replaced_parameters_are_checked_as_those_defined():
     """A variance below 0, which `linearised` took for one: its F was negative."""
     model = Model.define("x/c + v", "x + w", {"c": 1, "r": 1}, meter_noise={"variance": "r"})
     for equation, change in (("meter", {"r": -1}), ("state", {"c": 0})):
-        with pytest.raises(ModelError, match=f"the {equation} equation .* has no finite real value with these parameters"):
+        with pytest.raises(
+            ModelError,
+            match=f"the {equation} equation .* has no finite real value with these parameters",
+        ):
             model.replace(**change)
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), "0.9", None, True, 1j, 1e300, 1e-300])
+@pytest.mark.parametrize(
+    "value", [float("nan"), float("inf"), "0.9", None, True, 1j, 1e300, 1e-300]
+)
 def test_a_parameter_is_a_finite_number(value):
     with pytest.raises(ModelError, match="parameter c"):
         Model.define("c*x + v", "x + w", {"c": value})
@@ -134,7 +145,9 @@ def test_equations_that_do_not_fit_are_refused(state, meter, error):
         Model.define(state, meter)
 
 
-@pytest.mark.parametrize("arguments", [{"parameters": [1]}, {"prior": 3}, {"symbols": [1]}, {"symbols": {"v": []}}])
+@pytest.mark.parametrize(
+    "arguments", [{"parameters": [1]}, {"prior": 3}, {"symbols": [1]}, {"symbols": {"v": []}}]
+)
 def test_what_is_not_a_table_of_names_or_numbers_is_refused_as_a_model_error(arguments):
     with pytest.raises(ModelError):
         Model.define("x/2", "x + w", **arguments)
@@ -146,12 +159,17 @@ def test_parameter_values_that_leave_no_finite_formula_are_refused():
 
 
 def test_a_model_prints_its_equations_and_values(variant53):
-    assert repr(variant53) == "Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)"
+    assert (
+        repr(variant53)
+        == "Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)"
+    )
 
 
 def test_a_vector_model_prints_every_component():
     model = Model.define(["a*x1 + x2", "x2 + v"], ["x1 + w1", "2*x2 + w2"], {"a": 0.5})
-    assert repr(model) == "Model(x1' = a*x1 + x2, x2' = v + x2, y1 = w1 + x1, y2 = w2 + 2*x2; a = 1/2)"
+    assert (
+        repr(model) == "Model(x1' = a*x1 + x2, x2' = v + x2, y1 = w1 + x1, y2 = w2 + 2*x2; a = 1/2)"
+    )
     equations = [
         r"x_{1,k+1} &= a x_{1} + x_{2} \\",
         r"x_{2,k+1} &= x_{2} + v \\",
@@ -170,5 +188,7 @@ def test_the_latex_of_a_scalar_model_has_no_indices(variant53):
 
 def test_equations_may_be_an_immutable_matrix():
     x1, x2, v = sp.symbols("x1 x2 v")
-    model = Model.define(sp.ImmutableMatrix([x1 + x2, x2 + v]), sp.ImmutableMatrix([x1 + sp.Symbol("w")]))
+    model = Model.define(
+        sp.ImmutableMatrix([x1 + x2, x2 + v]), sp.ImmutableMatrix([x1 + sp.Symbol("w")])
+    )
     assert (model.n, model.p) == (2, 1)

@@ -15,9 +15,12 @@ x, y, m, mu = sp.symbols("x y m mu", real=True)
 d, q = sp.symbols("d q", positive=True)
 scalar = GaussianMoments([x], [m], sp.Matrix([[d]]))
 
-# A correlated pair, not close to singular; Gauss-Hermite with 40 points an axis integrates what follows to rounding.
+# A correlated pair, not close to singular; Gauss-Hermite with 40 points an axis integrates what
+# follows to rounding.
 MEAN, COV = [0.3, -0.7], [[0.5, 0.2], [0.2, 0.4]]
-numeric = GaussianMoments([x, y], [sp.Rational(3, 10), -sp.Rational(7, 10)], sp.Matrix(COV).applyfunc(sp.nsimplify))
+numeric = GaussianMoments(
+    [x, y], [sp.Rational(3, 10), -sp.Rational(7, 10)], sp.Matrix(COV).applyfunc(sp.nsimplify)
+)
 ROUNDING = 1e-12  # thousands of float64 operations on numbers of order 1
 
 
@@ -61,7 +64,9 @@ def plain(function):
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_the_mean_is_what_quadrature_finds(function):
     exact = float(numeric.mean_of(function))
-    assert exact == pytest.approx(oracles.gaussian_mean(plain(function), MEAN, COV), rel=ROUNDING, abs=ROUNDING)
+    assert exact == pytest.approx(
+        oracles.gaussian_mean(plain(function), MEAN, COV), rel=ROUNDING, abs=ROUNDING
+    )
 
 
 @pytest.mark.parametrize("left", FUNCTIONS[:4])
@@ -69,7 +74,9 @@ def test_the_mean_is_what_quadrature_finds(function):
 def test_the_covariance_is_what_quadrature_finds(left, right):
     f, g = plain(left), plain(right)
     mean_f, mean_g = (oracles.gaussian_mean(one, MEAN, COV) for one in (f, g))
-    expected = oracles.gaussian_mean(lambda points: (f(points) - mean_f) * (g(points) - mean_g), MEAN, COV)
+    expected = oracles.gaussian_mean(
+        lambda points: (f(points) - mean_f) * (g(points) - mean_g), MEAN, COV
+    )
     # The variances bound the size of what was added up, and so the rounding.
     assert float(numeric.covariance(left, right)) == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
@@ -77,8 +84,12 @@ def test_the_covariance_is_what_quadrature_finds(left, right):
 def test_covariance_is_bilinear_and_symmetric():
     f, g, h = FUNCTIONS[0], FUNCTIONS[1], FUNCTIONS[2]
     combined = numeric.covariance(2 * f - 3 * g, h)
-    assert float(combined) == pytest.approx(float(2 * numeric.covariance(f, h) - 3 * numeric.covariance(g, h)), rel=ROUNDING)
-    assert float(numeric.covariance(h, 2 * f - 3 * g)) == pytest.approx(float(combined), rel=ROUNDING)
+    assert float(combined) == pytest.approx(
+        float(2 * numeric.covariance(f, h) - 3 * numeric.covariance(g, h)), rel=ROUNDING
+    )
+    assert float(numeric.covariance(h, 2 * f - 3 * g)) == pytest.approx(
+        float(combined), rel=ROUNDING
+    )
 
 
 def test_a_variable_without_variance_is_a_constant():
@@ -88,14 +99,19 @@ def test_a_variable_without_variance_is_a_constant():
 
 
 def many_digits(function):
-    """Var function(x), x ~ N(mean, variance), in 60 digits: M f^2 - M f M f with Gauss-Hermite sums."""
+    """Var function(x), x ~ N(mean, variance), in 60 digits: M f^2 - M f M f with Gauss-Hermite
+    sums."""
 
     def variance(mean, cov):
         with mpmath.workdps(80):
             nodes, weights = (mpmath.matrix(a) for a in _hermite(12))
-            values = [function(mpmath.mpf(mean) + mpmath.sqrt(mpmath.mpf(cov)) * node) for node in nodes]
+            values = [
+                function(mpmath.mpf(mean) + mpmath.sqrt(mpmath.mpf(cov)) * node) for node in nodes
+            ]
             average = mpmath.fsum(w * v for w, v in zip(weights, values, strict=True))
-            return float(mpmath.fsum(w * (v - average) ** 2 for w, v in zip(weights, values, strict=True)))
+            return float(
+                mpmath.fsum(w * (v - average) ** 2 for w, v in zip(weights, values, strict=True))
+            )
 
     return variance
 
@@ -119,13 +135,21 @@ def _hermite(order):
         (sp.exp(x / 10**6), lambda t: mpmath.exp(t / 10**6)),
     ],
 )
-@pytest.mark.parametrize(("mean", "variance"), [(1e6, 1e-10), (1e3, 1e-6), (0.5, 1e-20), (2.0, 0.01)])
-def test_the_variance_keeps_its_digits_for_large_means_and_small_variances(function, precise, mean, variance):
-    # M f^2 - (M f)^2 in float64 would lose everything: f^2 is 1e12 and more, the variance 1e-10 and less.
+@pytest.mark.parametrize(
+    ("mean", "variance"), [(1e6, 1e-10), (1e3, 1e-6), (0.5, 1e-20), (2.0, 0.01)]
+)
+def test_the_variance_keeps_its_digits_for_large_means_and_small_variances(
+    function, precise, mean, variance
+):
+    # M f^2 - (M f)^2 in float64 would lose everything: f^2 is 1e12 and more, the variance 1e-10 and
+    # less.
     arguments = {"m": sp.Matrix([m]), "d": sp.Matrix([[d]])}
-    code = compile_function("variance", arguments, {"p": sp.Matrix([[scalar.covariance(function, function)]])}, ["m"])
+    code = compile_function(
+        "variance", arguments, {"p": sp.Matrix([[scalar.covariance(function, function)]])}, ["m"]
+    )
     found = code.function(np.array([[mean]]), np.array([[[variance]]]))[0].item()
-    # Rounding of the argument itself: sin and cos at 1e6 know their phase to 1e6 * 1e-16, a few products more.
+    # Rounding of the argument itself: sin and cos at 1e6 know their phase to 1e6 * 1e-16, a few
+    # products more.
     assert found == pytest.approx(many_digits(precise)(mean, variance), rel=1e-8)
 
 
@@ -151,26 +175,39 @@ def test_no_closed_form_names_the_term_and_the_way_out(function, term):
 
 
 def test_variance_of_a_sine_is_finite_for_any_variance():
-    """Var sin x -> 1/2 for a phase that is not known at all; exp(u) of the formula must not overflow on the way."""
+    """Var sin x -> 1/2 for a phase that is not known at all; exp(u) of the formula must not
+    overflow on the way."""
     x, m, d = sp.symbols("x m d", real=True)
-    variance = sp.lambdify([m, d], GaussianMoments([x], [m], sp.Matrix([[d]])).covariance(sp.sin(x), sp.sin(x)), "numpy")
+    variance = sp.lambdify(
+        [m, d],
+        GaussianMoments([x], [m], sp.Matrix([[d]])).covariance(sp.sin(x), sp.sin(x)),
+        "numpy",
+    )
     with np.errstate(all="raise", under="ignore"):
         assert variance(0.3, 5000.0) == pytest.approx(0.5, rel=1e-12)
 
 
 def test_sums_of_parameters_in_a_denominator_stay_together():
     s, T = sp.symbols("s T", real=True)
-    found = GaussianMoments([x], [m], sp.Matrix([[d]])).mean_of(T * sp.sin(x) / (1 + s**2) + sp.exp(x / (1 + s)) / (1 + T))
-    by_hand = T * sp.exp(-d / 2) * sp.sin(m) / (1 + s**2) + sp.exp(m / (1 + s) + d / (1 + s) ** 2 / 2) / (1 + T)
+    found = GaussianMoments([x], [m], sp.Matrix([[d]])).mean_of(
+        T * sp.sin(x) / (1 + s**2) + sp.exp(x / (1 + s)) / (1 + T)
+    )
+    by_hand = T * sp.exp(-d / 2) * sp.sin(m) / (1 + s**2) + sp.exp(
+        m / (1 + s) + d / (1 + s) ** 2 / 2
+    ) / (1 + T)
     at = {s: sp.Rational(3, 10), T: 2, m: sp.Rational(1, 2), d: sp.Rational(1, 4)}
     assert abs(sp.N((found - by_hand).subs(at), 30)) < 1e-25
 
 
 def test_what_is_no_law_or_another_s_symbol_is_refused():
-    """An x that is not real is another symbol than a real one: its square would be a constant, M[x^2] = x^2."""
+    """An x that is not real is another symbol than a real one: its square would be a constant,
+    M[x^2] = x^2."""
     x, y, m = sp.symbols("x y m", real=True)
     for means, cov in (([m, m], [[1]]), ([m], [[1, 0], [0, 1]]), ([], [[1]])):
-        with pytest.raises(ValueError, match=r"1 variable\(s\) need as many means, and a symmetric covariance 1 x 1"):
+        with pytest.raises(
+            ValueError,
+            match=r"1 variable\(s\) need as many means, and a symmetric covariance 1 x 1",
+        ):
             GaussianMoments([x], means, sp.Matrix(cov))
     with pytest.raises(ValueError, match="symmetric covariance 2 x 2"):
         GaussianMoments([x, y], [m, m], sp.Matrix([[1, 0.5], [0, 1]]))

@@ -1,4 +1,5 @@
-"""Quadrature: published figures, points, what does not vary, and warnings where points cannot integrate."""
+"""Quadrature: published figures, points, what does not vary, and warnings where points cannot
+integrate."""
 
 import warnings
 
@@ -41,13 +42,17 @@ def two_states(state_noise_factor="1"):
         ["x1*x2 + w1 + 2*w2", "x2 + 0.3*x1*w3"],
         prior={"mean": [0.5, -0.4], "variance": [[0.4, 0.1], [0.1, 0.3]]},
         state_noise={"mean": [0.1, 0.2], "variance": [[0.5, 0.2], [0.2, 0.4]]},
-        meter_noise={"mean": [0.3, -0.1, 0.2], "variance": [[0.3, 0.1, 0], [0.1, 0.2, 0.05], [0, 0.05, 0.4]]},
+        meter_noise={
+            "mean": [0.3, -0.1, 0.2],
+            "variance": [[0.3, 0.1, 0], [0.1, 0.2, 0.05], [0, 0.05, 0.4]],
+        },
     )
 
 
 @pytest.mark.parametrize("factor", ["1", "x1"])
 def test_added_noise_apart_is_added_noise_among_the_points(factor):
-    """By Gauss-Hermite, against points for the state and all noises; w2 is only added, but correlated with w3, which is not."""
+    """By Gauss-Hermite, against points for the state and all noises; w2 is only added, but
+    correlated with w3, which is not."""
     model = two_states(factor)
     structure = gauss_hermite(model, 6)
     mean, cov = model.prior.mean + 0.3, 2 * model.prior.cov
@@ -57,7 +62,10 @@ def test_added_noise_apart_is_added_noise_among_the_points(factor):
         (meter, model.meter_noise, structure.measure(mean, cov)),
     ):
         points, weights = product_rule(6)(2 + len(noise.mean))
-        joint = points @ scipy.linalg.block_diag(np.linalg.cholesky(cov), np.linalg.cholesky(noise.cov)).T
+        joint = (
+            points
+            @ scipy.linalg.block_diag(np.linalg.cholesky(cov), np.linalg.cholesky(noise.cov)).T
+        )
         values = equation(mean + joint[:, :2], noise.mean + joint[:, 2:])
         centre = weights @ values
         spread = (values - centre).T @ ((values - centre) * weights[:, None])
@@ -73,14 +81,22 @@ def test_added_noise_apart_is_added_noise_among_the_points(factor):
 def ungm(time_is_a_state):
     x, noise = (["x1/2 + 25*x1/(1 + x1**2) + 8*cos(1.2*x2) + v1", "x2 + 1"], "x1**2/20 + w1")
     if time_is_a_state:
-        return Model.define(x, noise, prior={"mean": [0, 0], "variance": [5.0, 0.0]}, state_noise={"variance": 10})
-    return Model.define("x/2 + 25*x/(1 + x**2) + v", "x**2/20 + w", prior={"variance": 5}, state_noise={"variance": 10})
+        return Model.define(
+            x, noise, prior={"mean": [0, 0], "variance": [5.0, 0.0]}, state_noise={"variance": 10}
+        )
+    return Model.define(
+        "x/2 + 25*x/(1 + x**2) + v",
+        "x**2/20 + w",
+        prior={"variance": 5},
+        state_noise={"variance": 10},
+    )
 
 
 @pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
 @pytest.mark.parametrize("kind", [lambda m: unscented(m), lambda m: gauss_hermite(m, 6)])
 def test_time_as_a_state_changes_nothing(kind):
-    """The growth model: the filter of the scalar model, moved by 8 cos 1.2 k from outside, is the same to rounding."""
+    """The growth model: the filter of the scalar model, moved by 8 cos 1.2 k from outside, is the
+    same to rounding."""
     model, scalar = ungm(True), kind(ungm(False))
     y = simulate(model, 20, 40, seed=1).y
     found = run(aof(kind(model)), y)
@@ -88,11 +104,16 @@ def test_time_as_a_state_changes_nothing(kind):
     one, state = aof(scalar), aof(scalar).init(20)
     for k in range(40):
         state = one.step(state, y[k])
-        # errors of rounding grow where the filter doubts between x and -x: to some 1e-9 in these 40 steps
+        # errors of rounding grow where the filter doubts between x and -x: to some 1e-9 in these 40
+        # steps
         np.testing.assert_allclose(found.mean[k, :, :1], state.posterior.mean, rtol=1e-7, atol=1e-7)
-        np.testing.assert_allclose(found.cov[k, :, :1, :1], state.posterior.cov, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(
+            found.cov[k, :, :1, :1], state.posterior.cov, rtol=1e-7, atol=1e-7
+        )
         predicted = state.predicted
-        state = state._replace(predicted=predicted._replace(mean=predicted.mean + 8 * np.cos(1.2 * k)))
+        state = state._replace(
+            predicted=predicted._replace(mean=predicted.mean + 8 * np.cos(1.2 * k))
+        )
 
 
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
@@ -117,25 +138,36 @@ def test_a_known_state_has_no_part_in_the_unexplained(kind):
 @pytest.mark.parametrize("kind", [linearised, gaussian, unscented, gauss_hermite])
 @pytest.mark.parametrize("slopes", [(1, 1), (1, 0.3), (0.7, -0.21)])
 def test_two_collinear_exact_meters_of_a_constant_state(kind, slopes):
-    """y = (s^T x, 2 s^T x), no noises, prior variance 1e8: s^T x is known after a step, and later measurements tell nothing."""
+    """y = (s^T x, 2 s^T x), no noises, prior variance 1e8: s^T x is known after a step, and later
+    measurements tell nothing."""
     a, b = slopes
     model = Model.define(
-        ["x1", "x2"], [f"{a}*x1 + {b}*x2", f"{2 * a}*x1 + {2 * b}*x2"], prior={"mean": [0, 0], "variance": [1e8, 1e8]}
+        ["x1", "x2"],
+        [f"{a}*x1 + {b}*x2", f"{2 * a}*x1 + {2 * b}*x2"],
+        prior={"mean": [0, 0], "variance": [1e8, 1e8]},
     )
     x, y = simulate(model, 200, 20, seed=2)
     found = run(aof(kind(model)), y)
     left = 1e8 * (np.eye(2) - np.outer(slopes, slopes) / np.dot(slopes, slopes))
-    np.testing.assert_allclose(np.broadcast_to(found.cov, (20, 200, 2, 2)), np.broadcast_to(left, (20, 200, 2, 2)), atol=1.0)
+    np.testing.assert_allclose(
+        np.broadcast_to(found.cov, (20, 200, 2, 2)),
+        np.broadcast_to(left, (20, 200, 2, 2)),
+        atol=1.0,
+    )
     nees = ((x - found.mean) ** 2)[-1].mean(axis=0) / np.diagonal(left)
-    assert (np.abs(nees - 1) < 4 * np.sqrt(2 / 200)).all()  # of 200 squares of standard normal numbers
+    # of 200 squares of standard normal numbers
+    assert (np.abs(nees - 1) < 4 * np.sqrt(2 / 200)).all()
 
 
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
 @pytest.mark.parametrize("units", [(1.0, 1.0), (1e-6, 1e9)])
 def test_slopes_are_seen_in_directions_without_variance(kind, units):
-    """x1 + x2 is known exactly, yet its meter has the slopes (1, 1), in any units; noise makes it a measurement again."""
+    """x1 + x2 is known exactly, yet its meter has the slopes (1, 1), in any units; noise makes it a
+    measurement again."""
     a, b = units
-    model = Model.define(["x1", "x2"], [f"{a}*x1 + {b}*x2", f"{a}*x1 - {b}*x2", f"{a}*x1 + {b}*x2 + w1"])
+    model = Model.define(
+        ["x1", "x2"], [f"{a}*x1 + {b}*x2", f"{a}*x1 - {b}*x2", f"{a}*x1 + {b}*x2 + w1"]
+    )
     cov = 1e8 * np.array([[1.0, -1.0], [-1.0, 1.0]]) / np.outer(units, units)
     G, F, R = kind(model).measure(np.array([3.0, 4.0]) / units, cov)[1:]
     # the enlarged variances are 2e-14 of 1e8, so slopes have half of the digits
@@ -183,7 +215,9 @@ def test_what_is_not_finite_at_the_points_is_said(kind, term):
 
 
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
-@pytest.mark.parametrize("term", ["0", "7", "sin(x)", "x**3", "exp(0.5*x)", "sqrt(4 + x)", "x*v", "tanh(x/2)"])
+@pytest.mark.parametrize(
+    "term", ["0", "7", "sin(x)", "x**3", "exp(0.5*x)", "sqrt(4 + x)", "x*v", "tanh(x/2)"]
+)
 def test_where_the_points_do_nothing_is_said(kind, term):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -191,7 +225,8 @@ def test_where_the_points_do_nothing_is_said(kind, term):
 
 
 def test_on_variant_53_the_unscented_filter_is_the_extended_one(variant53):
-    """The points lie on the axes: off the mean either x or the noise moves, so of x^2 w and x v they see the tangents."""
+    """The points lie on the axes: off the mean either x or the noise moves, so of x^2 w and x v
+    they see the tangents."""
     y = simulate(variant53, 50, 30, seed=1).y
     by_points, by_tangent = run(aof(unscented(variant53)), y), run(aof(linearised(variant53)), y)
     # 30 steps of a stable recursion
@@ -204,8 +239,11 @@ def test_on_variant_53_the_unscented_filter_is_the_extended_one(variant53):
 @pytest.mark.parametrize("kind", [gauss_hermite, unscented])
 @pytest.mark.parametrize("units", [1.0, 1e-9])
 def test_what_a_meter_does_not_tell_is_exactly_nothing(kind, units):
-    """Points sum odd functions to 1e-17: a gain of that size makes the estimate the measurement, in units of its own."""
-    model = Model.define("x + v", "u*(x**2/20 + cos(x)) + u*w", {"u": units}, prior={"mean": 0, "variance": 5})
+    """Points sum odd functions to 1e-17: a gain of that size makes the estimate the measurement, in
+    units of its own."""
+    model = Model.define(
+        "x + v", "u*(x**2/20 + cos(x)) + u*w", {"u": units}, prior={"mean": 0, "variance": 5}
+    )
     with warnings.catch_warnings(action="ignore", category=QuadratureWarning):
         measured = kind(model).measure(np.zeros((3, 1)), np.array([[5.0], [0.1], [7.3]])[:, None])
     np.testing.assert_array_equal(measured.G, 0.0)
@@ -214,7 +252,8 @@ def test_what_a_meter_does_not_tell_is_exactly_nothing(kind, units):
 
 @pytest.mark.parametrize("build", [unscented, gauss_hermite])
 def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
-    """The states are then known, as by the closed form; 1e-32 in the place of 0 made a likelihood of -1e29."""
+    """The states are then known, as by the closed form; 1e-32 in the place of 0 made a likelihood
+    of -1e29."""
     model = Model.define("0.9*x + v", "2*x + 1", prior={"mean": 0.3, "variance": 2.0})
     y = np.array([1.7, 0.2, -3.0])
     found, exact = (run(aof(one(model)), y) for one in (build, gaussian))
@@ -227,7 +266,8 @@ def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
 
 
 def test_a_covariance_that_rounding_has_broken_is_no_error():
-    """After a measurement 1e13 times as sharp as the prior the covariance of the state is none, by some units of precision."""
+    """After a measurement 1e13 times as sharp as the prior the covariance of the state is none, by
+    some units of precision."""
     prior = {"mean": [0, 1], "variance": [1e8, 4e8]}
     model = Model.define(["x1 + x2", "x2"], ["x1 + 1e-9*w1", "x1 + x2 + w2"], prior=prior)
     filters = aof(gauss_hermite(model)), aof(linearised(model))

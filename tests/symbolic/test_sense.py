@@ -1,4 +1,5 @@
-"""Numbers and laws that no computation could use are refused where a model is defined, with the place and the cure."""
+"""Numbers and laws that no computation could use are refused where a model is defined, with the
+place and the cure."""
 
 import numpy as np
 import pytest
@@ -33,7 +34,9 @@ def test_a_covariance_is_one_in_any_units(cov, right):
 def test_products_of_a_random_root_are_covariances():
     rng = np.random.default_rng(1)
     for size in range(1, 8):
-        root = rng.standard_normal((size, max(size - 1, 1))) * 10.0 ** rng.uniform(-20, 20, (size, 1))
+        root = rng.standard_normal((size, max(size - 1, 1))) * 10.0 ** rng.uniform(
+            -20, 20, (size, 1)
+        )
         assert is_covariance(root @ root.T)
 
 
@@ -59,7 +62,9 @@ def test_a_parameter_s_exact_value_has_a_size_too():
         Model.define("a*x + v", "x + w", {"a": sp.Integer(10) ** 400})
 
 
-@pytest.mark.parametrize(("state", "parameters"), [("1e99*1e99*x + v", {}), ("cosh(a**16) + v", {"a": 1e99})])
+@pytest.mark.parametrize(
+    ("state", "parameters"), [("1e99*1e99*x + v", {}), ("cosh(a**16) + v", {"a": 1e99})]
+)
 def test_a_long_formula_or_number_is_shown_shortened(state, parameters):
     with pytest.raises(ModelError) as caught:
         Model.define(state, "x + w", parameters)
@@ -67,7 +72,8 @@ def test_a_long_formula_or_number_is_shown_shortened(state, parameters):
 
 
 def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
-    """Each number is within its limits, their product in the moments is not: generated code would hold the name `inf`."""
+    """Each number is within its limits, their product in the moments is not: generated code would
+    hold the name `inf`."""
     with pytest.raises(ModelError, match=r"derived functions hold the number .*e"):
         gaussian(Model.define("(1e90*x + v)**4", "x + w"))
 
@@ -78,7 +84,9 @@ def test_no_number_is_taken_out_of_a_power_beyond_the_floats():
     assert state(np.array([1.0]), np.array([0.5])) == 1.5
     x, v = sp.symbols("x v", real=True)
     power = (x + sp.Rational(1, 10**99)) ** 4 + v
-    assert "e-396" not in javascript.loop("f", {"x": sp.Matrix([x]), "v": sp.Matrix([v])}, {"y": sp.Matrix([power])})
+    assert "e-396" not in javascript.loop(
+        "f", {"x": sp.Matrix([x]), "v": sp.Matrix([v])}, {"y": sp.Matrix([power])}
+    )
 
 
 @pytest.mark.parametrize(
@@ -86,13 +94,20 @@ def test_no_number_is_taken_out_of_a_power_beyond_the_floats():
     [
         ("x + (w if c <= sinh(c) else 2*w)", {"c": 1e-60}),  # sinh(c) = c in 120 digits
         ("x + (w if 1e-60 <= sinh(1e-60) else 2*w)", {}),
-        ("x + (w if (1 if c <= sinh(c) else 2) <= x else 2*w)", {"c": 1e-60}),  # a choice in a condition
-        ("x + w + (1 if w <= c*sinh(c) - c*c else 2)", {"c": 1e-60}),  # where the noise is at its mean, 0
+        # a choice in a condition
+        ("x + (w if (1 if c <= sinh(c) else 2) <= x else 2*w)", {"c": 1e-60}),
+        # where the noise is at its mean, 0
+        ("x + w + (1 if w <= c*sinh(c) - c*c else 2)", {"c": 1e-60}),
     ],
 )
 def test_a_choice_that_nobody_can_make_is_refused(meter, parameters):
     """SymPy would try for ever."""
-    with time_limit(20), pytest.raises((FormulaError, ModelError), match="choice depends on numbers that do not differ"):
+    with (
+        time_limit(20),
+        pytest.raises(
+            (FormulaError, ModelError), match="choice depends on numbers that do not differ"
+        ),
+    ):
         Model.define("0.9*x + v", meter, parameters)
 
 
@@ -119,7 +134,12 @@ def test_a_choice_of_numbers_that_differ_is_made():
         ("0.9*x + v", "x", {}, ""),
         ("0.9*x + v", "x + w", {"prior": {"variance": 0}}, ""),
         ("0.9*x", "x", {}, "no noise enters"),
-        ("0.9*x + v", "x + w", {"state_noise": {"variance": 0}, "meter_noise": {"variance": 0}}, "no noise enters"),
+        (
+            "0.9*x + v",
+            "x + w",
+            {"state_noise": {"variance": 0}, "meter_noise": {"variance": 0}},
+            "no noise enters",
+        ),
         ("0.9*x + e*v", "x", {}, "no noise enters"),  # e = 0
         ("0.9*x", "x + w", {"prior": {"variance": 0}}, "known exactly"),
     ],

@@ -15,7 +15,12 @@ from kfcourse.symbolic.structure import gaussian, linearised
 pytestmark = pytest.mark.quick
 
 c, e, g, f, z, p, m, d = sp.symbols("c e g f z p m d", real=True)
-KINDS = {"linearised": linearised, "gaussian": gaussian, "unscented": unscented, "gauss-hermite": gauss_hermite}
+KINDS = {
+    "linearised": linearised,
+    "gaussian": gaussian,
+    "unscented": unscented,
+    "gauss-hermite": gauss_hermite,
+}
 
 TABLE = {
     "linearised": {
@@ -46,12 +51,16 @@ def test_variant_53_has_the_functions_of_the_page(variant53, kind, function):
 
 
 def vector_model():
-    """Two components, more noises than equations, correlated noises with means, everything non-unit."""
+    """Two components, more noises than equations, correlated noises with means, everything
+    non-unit."""
     return Model.define(
         ["0.9*x1 + 0.2*x2*v1 + 0.1*v2", "0.8*x2 - 0.1*x1**2 + 0.3*v2*v3"],
         ["x1*x2 + 0.2*w1", "x2 + 0.5*x1*w2 + 0.1*w1**2"],
         prior={"mean": [0.5, -0.4], "variance": [[0.4, 0.1], [0.1, 0.3]]},
-        state_noise={"mean": [0.1, -0.2, 0.3], "variance": [[0.5, 0.1, 0], [0.1, 0.4, 0.05], [0, 0.05, 0.3]]},
+        state_noise={
+            "mean": [0.1, -0.2, 0.3],
+            "variance": [[0.5, 0.1, 0], [0.1, 0.4, 0.05], [0, 0.05, 0.3]],
+        },
         meter_noise={"mean": [0.2, -0.1], "variance": [[0.3, 0.1], [0.1, 0.2]]},
     )
 
@@ -67,31 +76,51 @@ def van_der_pol():
 
 MODELS = {
     "variant 53": lambda: Model.define(
-        "c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02}, prior={"mean": 0.3}
+        "c*x + e*x*v",
+        "g*x + f*x**2*w",
+        {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02},
+        prior={"mean": 0.3},
     ),
-    "sine": lambda: Model.define("a*sin(x) + 0.2*v", "x*cos(x) + exp(0.3*x)*w", {"a": 0.7}, prior={"mean": 0.4, "variance": 0.3}),
+    "sine": lambda: Model.define(
+        "a*sin(x) + 0.2*v",
+        "x*cos(x) + exp(0.3*x)*w",
+        {"a": 0.7},
+        prior={"mean": 0.4, "variance": 0.3},
+    ),
     "noise in the exponent": lambda: Model.define(
-        "0.9*x + exp(0.1*v)*sin(v)", "sinh(x/2) + exp(0.1*w)",
-        prior={"mean": -0.2, "variance": 0.5}, state_noise={"variance": 0.4},
+        "0.9*x + exp(0.1*v)*sin(v)",
+        "sinh(x/2) + exp(0.1*w)",
+        prior={"mean": -0.2, "variance": 0.5},
+        state_noise={"variance": 0.4},
     ),
-    "irrational constants": lambda: Model.define("sqrt(2)*exp(-c)*x + sin(c)*pi*v", "x*sqrt(3)*log(c) + cos(1)*w", {"c": 2}),
+    "irrational constants": lambda: Model.define(
+        "sqrt(2)*exp(-c)*x + sin(c)*pi*v", "x*sqrt(3)*log(c) + cos(1)*w", {"c": 2}
+    ),
     "vector": vector_model,
     "van der Pol": van_der_pol,
-    "parameters named as the arguments": lambda: Model.define("p*x + z*v", "d*x + m*w", {"p": 0.9, "z": 0.5, "d": 2, "m": 0.4}),
+    "parameters named as the arguments": lambda: Model.define(
+        "p*x + z*v", "d*x + m*w", {"p": 0.9, "z": 0.5, "d": 2, "m": 0.4}
+    ),
     "parameters with an underscore too": lambda: Model.define(
         "z*x + z_*v", "m*x + m_*w + d_*x*w", {"z": 0.9, "z_": 0.5, "m": 2, "m_": 0.3, "d_": 0.1}
     ),
-    "state named z": lambda: Model.define("a*z + v", "z**2 + w", {"a": 0.8}, symbols={"x": ["z"]}, prior={"mean": 1}),
+    "state named z": lambda: Model.define(
+        "a*z + v", "z**2 + w", {"a": 0.8}, symbols={"x": ["z"]}, prior={"mean": 1}
+    ),
     "vector with names taken": lambda: Model.define(
-        ["z1*x1 + p12*x2 + v1", "d11*x2 + p22*v1*x1"], ["x1 + m1*x2 + w"],
+        ["z1*x1 + p12*x2 + v1", "d11*x2 + p22*v1*x1"],
+        ["x1 + m1*x2 + w"],
         {"z1": 0.9, "p12": 0.3, "d11": 0.8, "p22": 0.1, "m1": 0.5},
     ),
-    "sympy names": lambda: Model.define("E*x + I*v", "S*x + N*w", {"E": 0.9, "I": 0.5, "S": 2, "N": 0.3}),
-}  # fmt: skip
+    "sympy names": lambda: Model.define(
+        "E*x + I*v", "S*x + N*w", {"E": 0.9, "I": 0.5, "S": 2, "N": 0.3}
+    ),
+}
 
 
 def quadrature(model, equation, law):
-    """Mean, covariance, and sensitivity Cov(., x) P^-1 of an equation at the prior, with 10 points an axis."""
+    """Mean, covariance, and sensitivity Cov(., x) P^-1 of an equation at the prior, with 10 points
+    an axis."""
     mean = np.concatenate([model.prior.mean, law.mean])
     n, size = model.n, len(mean)
     cov = np.zeros((size, size))
@@ -101,12 +130,24 @@ def quadrature(model, equation, law):
     order = 10 if size < 5 else 6
 
     def moment(function):
-        return oracles.gaussian_mean(lambda points: function(points) + 0 * points[0], mean, cov, order)
+        return oracles.gaussian_mean(
+            lambda points: function(points) + 0 * points[0], mean, cov, order
+        )
 
     means = np.array([moment(lambda t, row=row: row(*t)) for row in rows])
-    deviations = [lambda t, row=row, centre=centre: row(*t) - centre for row, centre in zip(rows, means, strict=True)]
-    covs = np.array([[moment(lambda t, r=r, q=q: r(t) * q(t)) for q in deviations] for r in deviations])
-    cross = np.array([[moment(lambda t, row=row, j=j: row(*t) * (t[j] - mean[j])) for j in range(n)] for row in rows])
+    deviations = [
+        lambda t, row=row, centre=centre: row(*t) - centre
+        for row, centre in zip(rows, means, strict=True)
+    ]
+    covs = np.array(
+        [[moment(lambda t, r=r, q=q: r(t) * q(t)) for q in deviations] for r in deviations]
+    )
+    cross = np.array(
+        [
+            [moment(lambda t, row=row, j=j: row(*t) * (t[j] - mean[j])) for j in range(n)]
+            for row in rows
+        ]
+    )
     return means, covs, cross @ np.linalg.inv(model.prior.cov)
 
 
@@ -117,17 +158,28 @@ def test_gaussian_functions_are_what_quadrature_finds(name):
     mean, cov = model.prior.mean[None], model.prior.cov[None]
     tau, theta = structure.predict(mean, cov)
     # Ten points an axis integrate exponentials and sines of these variances to 1e-9.
-    expected_tau, expected_theta, expected_A = quadrature(model, model.state_equation, model.state_noise)
-    np.testing.assert_allclose(np.broadcast_to(tau, (1, model.n))[0], expected_tau, rtol=1e-8, atol=1e-9)
-    np.testing.assert_allclose(np.broadcast_to(theta, (1, model.n, model.n))[0], expected_theta, rtol=1e-8, atol=1e-9)
+    expected_tau, expected_theta, expected_A = quadrature(
+        model, model.state_equation, model.state_noise
+    )
+    np.testing.assert_allclose(
+        np.broadcast_to(tau, (1, model.n))[0], expected_tau, rtol=1e-8, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        np.broadcast_to(theta, (1, model.n, model.n))[0], expected_theta, rtol=1e-8, atol=1e-9
+    )
     # Stein: dtau/dz = Cov(a, x) P^-1, dh/dm = Cov(b, x) P^-1
     np.testing.assert_allclose(
-        np.broadcast_to(structure.transition(mean, cov).A, (1, model.n, model.n))[0], expected_A, rtol=1e-8, atol=1e-9
+        np.broadcast_to(structure.transition(mean, cov).A, (1, model.n, model.n))[0],
+        expected_A,
+        rtol=1e-8,
+        atol=1e-9,
     )
     found = structure.measure(mean, cov)
     h, F, G = quadrature(model, model.meter_equation, model.meter_noise)
     for array, expected in zip(found[:3], (h, G, F), strict=True):
-        np.testing.assert_allclose(np.broadcast_to(array, (1, *expected.shape))[0], expected, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(
+            np.broadcast_to(array, (1, *expected.shape))[0], expected, rtol=1e-8, atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -138,13 +190,21 @@ def test_linearised_functions_are_values_and_difference_quotients(name):
     step = 1e-5  # central differences err by step^2 |f'''| + 1e-16 / step, below 1e-9 here
 
     def slopes(function, at):
-        return np.stack([(function(at + row) - function(at - row)) / (2 * step) for row in step * np.eye(len(at))], axis=-1)
+        return np.stack(
+            [
+                (function(at + row) - function(at - row)) / (2 * step)
+                for row in step * np.eye(len(at))
+            ],
+            axis=-1,
+        )
 
     structure = linearised(model)
     tau, theta = structure.predict(x, model.prior.cov)
     A, B = slopes(lambda t: state(t, v), x), slopes(lambda t: state(x, t), v)
     np.testing.assert_allclose(tau, state(x, v), rtol=1e-13)
-    np.testing.assert_allclose(theta, A @ model.prior.cov @ A.T + B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(
+        theta, A @ model.prior.cov @ A.T + B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8
+    )
     following = structure.transition(x, model.prior.cov)
     np.testing.assert_allclose(following.A, A, rtol=1e-7, atol=1e-8)
     np.testing.assert_allclose(following.Q, B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8)
@@ -152,21 +212,32 @@ def test_linearised_functions_are_values_and_difference_quotients(name):
     H, C = slopes(lambda t: meter(t, w), x), slopes(lambda t: meter(x, t), w)
     np.testing.assert_allclose(h, meter(x, w), rtol=1e-13)
     np.testing.assert_allclose(G, H, rtol=1e-7, atol=1e-8)
-    np.testing.assert_allclose(F, H @ model.prior.cov @ H.T + C @ model.meter_noise.cov @ C.T, rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(
+        F, H @ model.prior.cov @ H.T + C @ model.meter_noise.cov @ C.T, rtol=1e-7, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("name", ["variant 53", "vector", "van der Pol"])
 def test_gauss_hermite_is_exact_for_polynomials(name):
     model = MODELS[name]()
-    mean, cov = np.stack([model.prior.mean, model.prior.mean + 0.3]), np.stack([model.prior.cov, 2 * model.prior.cov])
+    mean, cov = (
+        np.stack([model.prior.mean, model.prior.mean + 0.3]),
+        np.stack([model.prior.cov, 2 * model.prior.cov]),
+    )
     exact, numerical = gaussian(model), gauss_hermite(model, 4)
     # degree 3 at most, so squares of degree 6 < 2 * 4; rounding of some hundred summands
     for found, expected in zip(
-        (*numerical.predict(mean, cov), *numerical.measure(mean, cov), *numerical.transition(mean, cov)),
+        (
+            *numerical.predict(mean, cov),
+            *numerical.measure(mean, cov),
+            *numerical.transition(mean, cov),
+        ),
         (*exact.predict(mean, cov), *exact.measure(mean, cov), *exact.transition(mean, cov)),
         strict=True,
     ):
-        np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), rtol=1e-11, atol=1e-11)
+        np.testing.assert_allclose(
+            found, np.broadcast_to(expected, found.shape), rtol=1e-11, atol=1e-11
+        )
 
 
 @pytest.mark.parametrize("kappa", [None, 0.5, 2.0])
@@ -174,13 +245,23 @@ def test_unscented_means_are_exact_for_quadratic_functions(kappa):
     model = vector_model()
     mean, cov = model.prior.mean[None], model.prior.cov[None]
     exact, numerical = gaussian(model), unscented(model, kappa)
-    np.testing.assert_allclose(numerical.predict(mean, cov).mean, exact.predict(mean, cov).mean, rtol=1e-12)
-    np.testing.assert_allclose(numerical.measure(mean, cov).h, exact.measure(mean, cov).h, rtol=1e-12)
-    np.testing.assert_allclose(numerical.measure(mean, cov).G, np.broadcast_to(exact.measure(mean, cov).G, (1, 2, 2)), rtol=1e-12)
+    np.testing.assert_allclose(
+        numerical.predict(mean, cov).mean, exact.predict(mean, cov).mean, rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        numerical.measure(mean, cov).h, exact.measure(mean, cov).h, rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        numerical.measure(mean, cov).G,
+        np.broadcast_to(exact.measure(mean, cov).G, (1, 2, 2)),
+        rtol=1e-12,
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["variant 53", "vector", "van der Pol", "parameters with an underscore too"])
+@pytest.mark.parametrize(
+    "name", ["variant 53", "vector", "van der Pol", "parameters with an underscore too"]
+)
 def test_the_unexplained_part_is_what_sensitivity_leaves(kind, name):
     model = MODELS[name]()
     mean, cov = model.prior.mean[None], model.prior.cov[None]
@@ -211,22 +292,37 @@ def test_results_broadcast_over_the_ensemble(kind, state, meter):
         h, G, F = structure.measure(mean, one)[:3]
         A, Q = structure.transition(mean, one)
         square = (7, 1, 1)
-        for array, shape in ((tau, (7, 1)), (theta, square), (A, square), (Q, square), (h, (7, 1)), (G, square), (F, square)):
+        for array, shape in (
+            (tau, (7, 1)),
+            (theta, square),
+            (A, square),
+            (Q, square),
+            (h, (7, 1)),
+            (G, square),
+            (F, square),
+        ):
             assert np.broadcast_shapes(np.shape(array), shape) == shape
             assert np.isfinite(array).all()
 
 
 def test_large_means_lose_no_digits():
-    # Theta of x + x^2 v and F of x^2 + w at mean 1e6, variance 1e-10: closed forms, evaluated exactly.
+    # Theta of x + x^2 v and F of x^2 + w at mean 1e6, variance 1e-10: closed forms, evaluated
+    # exactly.
     structure = gaussian(Model.define("x + sin(x)", "x**2"))
     mean, variance = sp.Integer(10) ** 6, sp.Rational(1, 10**10)
     found = structure.measure(np.array([[1e6]]), np.array([[[1e-10]]])).F.item()
     assert found == pytest.approx(float(4 * mean**2 * variance + 2 * variance**2), rel=1e-14)
-    # Var(x + sin x) = p + 2 p cos(z) e^{-p/2} + Var sin x; Var sin x = (1 - e^{-p}) (1 + e^{-p} cos 2z) / 2
+    # Var(x + sin x) = p + 2 p cos(z) e^{-p/2} + Var sin x; Var sin x = (1 - e^{-p}) (1 + e^{-p} cos
+    # 2z) / 2
     q = sp.exp(-variance)
-    theta = variance + 2 * variance * sp.cos(mean) * sp.sqrt(q) + (1 - q) * (1 + q * sp.cos(2 * mean)) / 2
+    theta = (
+        variance
+        + 2 * variance * sp.cos(mean) * sp.sqrt(q)
+        + (1 - q) * (1 + q * sp.cos(2 * mean)) / 2
+    )
     found = structure.predict(np.array([[1e6]]), np.array([[[1e-10]]])).cov.item()
-    assert found == pytest.approx(float(theta.evalf(60)), rel=1e-9)  # the phase 1e6 is known to 1e-10
+    # the phase 1e6 is known to 1e-10
+    assert found == pytest.approx(float(theta.evalf(60)), rel=1e-9)
 
 
 def test_numerical_structures_have_no_formulas(variant53):
@@ -236,7 +332,10 @@ def test_numerical_structures_have_no_formulas(variant53):
                 ask(KINDS[kind](variant53))
 
 
-@pytest.mark.parametrize("term", ["tan(x)", "log(1 + x**2)", "sqrt(x)", "abs(x)", "atan(x)", "exp(-x**2)", "x/(1 + x**2)"])
+@pytest.mark.parametrize(
+    "term",
+    ["tan(x)", "log(1 + x**2)", "sqrt(x)", "abs(x)", "atan(x)", "exp(-x**2)", "x/(1 + x**2)"],
+)
 def test_no_closed_form_leads_to_a_numerical_structure(term):
     model = Model.define(f"0.5*x + {term} + v", "x + w", prior={"mean": 1, "variance": 0.01})
     with pytest.raises(NoClosedForm, match=r"use linearised\(model\)"):
@@ -245,8 +344,11 @@ def test_no_closed_form_leads_to_a_numerical_structure(term):
 
 
 def test_an_exponential_of_a_large_constant_is_not_torn_apart():
-    """A density e^((R - r)/H) near r = R: e^(2R/H) is e^950, beyond all numbers, and must not be computed by itself."""
-    model = Model.define("x - T*b*exp((R - x)/H) + v", "x + w", {"T": 0.1, "b": 0.6, "R": 6374, "H": 13.406})
+    """A density e^((R - r)/H) near r = R: e^(2R/H) is e^950, beyond all numbers, and must not be
+    computed by itself."""
+    model = Model.define(
+        "x - T*b*exp((R - x)/H) + v", "x + w", {"T": 0.1, "b": 0.6, "R": 6374, "H": 13.406}
+    )
     z, p, slope = 6400.0, 2.0, 1 + 0.1 * 0.6 / 13.406 * np.exp(-26 / 13.406)
     tau, Theta = linearised(model).predict(np.array([[z]]), np.array([[[p]]]))
     np.testing.assert_allclose(tau, [[z - 0.1 * 0.6 * np.exp(-26 / 13.406)]], rtol=1e-13)
@@ -294,7 +396,13 @@ def test_the_source_that_runs_has_no_powers(variant53, kind):
 
 def test_latex_prints_all_five_functions(variant53):
     text = gaussian(variant53).latex()
-    for left in (r"\tau(z, p) &= c z", r"\Theta(z, p) &=", "h(m, d) &= g m", "G(m, d) &= g", "F(m, d) &="):
+    for left in (
+        r"\tau(z, p) &= c z",
+        r"\Theta(z, p) &=",
+        "h(m, d) &= g m",
+        "G(m, d) &= g",
+        "F(m, d) &=",
+    ):
         assert left in text
 
 
@@ -330,10 +438,15 @@ def test_the_noiseless_model_has_its_noises_at_their_means():
 
 @pytest.mark.parametrize("derive", [linearised, gaussian])
 def test_models_that_differ_in_a_number_only_are_not_taken_for_each_other(derive, variant53):
-    """What is derived for one is used for the other: formulas for other parameters, and nothing for other noises."""
+    """What is derived for one is used for the other: formulas for other parameters, and nothing for
+    other noises."""
     z, p = np.array([[1.2]]), np.array([[[0.3]]])
     noisier = Model.define(
-        "c*x + e*x*v", "g*x + f*x**2*w", dict(variant53.parameters), state_noise={"variance": 4}, meter_noise={"variance": 4}
+        "c*x + e*x*v",
+        "g*x + f*x**2*w",
+        dict(variant53.parameters),
+        state_noise={"variance": 4},
+        meter_noise={"variance": 4},
     )
     found = []
     for model in (variant53, variant53.replace(e=0.1, f=0.04), noisier, variant53):
@@ -341,5 +454,6 @@ def test_models_that_differ_in_a_number_only_are_not_taken_for_each_other(derive
         assert structure.model is model
         found.append((structure.predict(z, p).cov, structure.measure(z, p).R))
     first, doubled, other, again = found
-    np.testing.assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)  # e v with twice the e, or four times the variance
+    # e v with twice the e, or four times the variance
+    np.testing.assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)
     assert np.array_equal(first, again) and not np.allclose(first, doubled)

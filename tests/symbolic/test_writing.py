@@ -44,7 +44,9 @@ def test_order(expression, variables, noises, latex) -> None:
 def test_what_is_written_is_what_was_given(name) -> None:
     from kfcourse import Model, gaussian
 
-    model = Model.define("x + T*sin(x)/s + s*exp(-x)*v", "sqrt(2)*x**2*cos(x) - w/3", dict(T=0.1, s=0.2))
+    model = Model.define(
+        "x + T*sin(x)/s + s*exp(-x)*v", "sqrt(2)*x**2*cos(x) - w/3", dict(T=0.1, s=0.2)
+    )
     formula = gaussian(model)[name]
     arranged = _Writer(sorted(formula.free_symbols, key=str), []).arranged(formula)
     assert sp.simplify(arranged.doit() - formula) == 0
@@ -52,7 +54,13 @@ def test_what_is_written_is_what_was_given(name) -> None:
 
 @pytest.mark.parametrize(
     ("value", "expected"),
-    [(1, "1"), (0.5, "0.5"), (5e-5, r"5 \cdot 10^{-5}"), (-3.986e14, r"-3.986 \cdot 10^{14}"), (-1e-6, "-10^{-6}")],
+    [
+        (1, "1"),
+        (0.5, "0.5"),
+        (5e-5, r"5 \cdot 10^{-5}"),
+        (-3.986e14, r"-3.986 \cdot 10^{14}"),
+        (-1e-6, "-10^{-6}"),
+    ],
 )
 def test_powers_of_ten_of_a_value_are_written_as_people_do(value, expected):
     assert number_latex(value) == expected
@@ -65,7 +73,9 @@ def test_the_code_s_expm1_is_written_as_people_do():
     printed = formula_latex(F, (m, d))
     assert "expm" not in printed
     assert printed == formula_latex(sp.expand(F.replace(expm1, lambda u: sp.exp(u) - 1)), (m, d))
-    by_hand = sp.Rational(1, 2) - sp.exp(-2 * d) / 2 + (sp.exp(-2 * d) - sp.exp(-d)) * sp.sin(m) ** 2 + 1
+    by_hand = (
+        sp.Rational(1, 2) - sp.exp(-2 * d) / 2 + (sp.exp(-2 * d) - sp.exp(-d)) * sp.sin(m) ** 2 + 1
+    )
     assert printed == formula_latex(sp.expand(by_hand), (m, d))  # sin^2 m + cos^2 m is 1
     assert "expm" not in " ".join(formula_lines(F, (m, d)))
 
@@ -79,7 +89,9 @@ def test_what_a_name_of_several_letters_multiplies_stands_apart() -> None:
 def test_one_logarithm_one_identity_and_words_upright_below() -> None:
     assert latex(sp.log(x)) == r"\ln{\left(x \right)}"
     assert latex(sp.Identity(3)) == "I"
-    assert latex(sp.Symbol("G_tangent")) == latex(sp.Symbol("G_{tangent}")) == r"G_{\mathrm{tangent}}"
+    assert (
+        latex(sp.Symbol("G_tangent")) == latex(sp.Symbol("G_{tangent}")) == r"G_{\mathrm{tangent}}"
+    )
 
 
 def test_a_name_with_an_index_gets_another_behind_a_comma() -> None:

@@ -1,12 +1,14 @@
-"""A scalar model's laws, of all its modes, printed as one small function that `panels` calls by its address.
+"""A scalar model's laws, of all its modes, printed as one small function that `panels` calls by its
+address.
 
 ::
 
     law(which, points, y, c, x, mean, deviation)
 
-fills mean and deviation at so many states x.  `which` is 2 j for the next state in mode j, 2 j + 1 for
-the measurement y, and -1 - (i J + j) for the probability, in the place of a mean, of a transition that
-depends on the state.  Parameters are read from c: the same formulas with other numbers are compiled once.
+fills mean and deviation at so many states x.  `which` is 2 j for the next state in mode j, 2 j + 1
+for the measurement y, and -1 - (i J + j) for the probability, in the place of a mean, of a
+transition that depends on the state.  Parameters are read from c: the same formulas with other
+numbers are compiled once.
 """
 
 from __future__ import annotations
@@ -40,7 +42,10 @@ from numba import cfunc
 VALUES = "float64[::1]"
 
 
-@cfunc("void(int64, int64, float64, {0}, {0}, {0}, {0})".format(VALUES), cache=True, error_model="numpy")
+SIGNATURE = "void(int64, int64, float64, {0}, {0}, {0}, {0})".format(VALUES)
+
+
+@cfunc(SIGNATURE, cache=True, error_model="numpy")
 def law(which, points, y, c, x, mean, deviation):
 '''
 
@@ -51,7 +56,8 @@ def modes_of(model: Model | JumpModel) -> Sequence[Model]:
 
 
 def constants(model: Model | JumpModel, k: int) -> Array:
-    """The array c of step k: of each mode its parameters and what is known of the step, then the chain's."""
+    """The array c of step k: of each mode its parameters and what is known of the step, then the
+    chain's."""
     parts = [[*map(float, mode.values.values()), *mode.known.at(k)] for mode in modes_of(model)]
     if isinstance(model, JumpModel):
         parts.append([*model.chain_of_step.known.at(k)])
@@ -69,7 +75,9 @@ def printed(model: Model | JumpModel) -> str:
     fixed = {modes[0].x[0]: _real("x[i]"), Y: _real("y")}
     of_modes = [fixed | names([*mode.values, *mode.known.symbols]) for mode in modes]
     for j, (mode, own) in enumerate(zip(modes, of_modes, strict=True)):
-        mean, deviation, meter, meter_deviation = (part.xreplace(own) for part in scalar_formulas(mode))
+        mean, deviation, meter, meter_deviation = (
+            part.xreplace(own) for part in scalar_formulas(mode)
+        )
         cases += [(2 * j, [mean, deviation]), (2 * j + 1, [meter, meter_deviation])]
     if isinstance(model, JumpModel) and model.by_state:
         own = of_modes[0] | names(model.chain_of_step.known.symbols)
@@ -108,7 +116,8 @@ class _Printer(PythonCodePrinter):
 
 @lru_cache(maxsize=256)
 def load(text: str) -> Any:
-    """The compiled function of a printed model, or what an earlier session has kept of it on the disk."""
+    """The compiled function of a printed model, or what an earlier session has kept of it on the
+    disk."""
     import numba
     from platformdirs import user_cache_path
 

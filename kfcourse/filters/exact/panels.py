@@ -1,9 +1,10 @@
-r"""The Stratonovich equation for one trajectory, compiled: densities on panels, halved until polynomials resolve them.
+r"""The Stratonovich equation for one trajectory, compiled: densities on panels, halved until
+polynomials resolve them.
 
 A density is held as its logarithm at the Q Lobatto points of each panel.  The polynomials through
-these points are the density, and their two last Legendre coefficients tell how good it is.  Lobatto's
-points see both ends of a panel: a hump at an end would lie between the points of Gauss.  A step takes
-three functions, read in this order:
+these points are the density, and their two last Legendre coefficients tell how good it is.
+Lobatto's points see both ends of a panel: a hump at an end would lie between the points of Gauss.
+A step takes three functions, read in this order:
 
 kernels    the prediction, a normal kernel for each point of the posterior.  Where those of a panel
            would leave gaps it is halved, and its polynomial gives the points between.  Kernels far
@@ -15,10 +16,12 @@ corrected  the posterior on these panels, halved until it is resolved
 
 Looking back, `corrected` multiplies by what later measurements tell of x (`sources`):
 
-    p(x_k | all y) ~ p(x_k | y_0..k) Integral p(x' | x_k) r(x') dx',    r = all that y_k+1.. tell of x'
+    p(x_k | all y) ~ p(x_k | y_0..k) Integral p(x' | x_k) r(x') dx',
+    r = all that y_k+1.. tell of x'
 
 A model comes as the address of one small function (`laws`), so that all this is compiled once for
-all models.  Everything compiled stands in this file, as the compiler keeps its work by the file's date.
+all models.  Everything compiled stands in this file, as the compiler keeps its work by the file's
+date.
 """
 
 from __future__ import annotations
@@ -48,8 +51,11 @@ from kfcourse.filters.exact.columns import (
     Q,
 )
 
-SPAN = 5.0  # deviations that the kernels of a panel may cover at accuracy 1e-3: eight points err with the 14th power
-BLUR = 0.01  # of a panel's length: kernels are widened to it, its fourth power is the error that is left
+# deviations that the kernels of a panel may cover at accuracy 1e-3: eight points err with the 14th
+# power
+SPAN = 5.0
+# of a panel's length: kernels are widened to it, its fourth power is the error that is left
+BLUR = 0.01
 REACH = 7.0  # deviations of a law that count: 1e-11 lies beyond
 WINDOW = 9.0  # deviations beyond which a kernel is left out of a sum: 1e-18 of its height
 APART = 3.0  # deviations of first borders from one another
@@ -67,7 +73,8 @@ PANELS, KERNELS = 3000, 200_000  # that a posterior and a prediction may have
 TURNS = 100  # halvings one after the other, at most
 WOUND = 50  # turns of an angle whose noise is so large that it tells nothing
 
-FINE, PANELLED, KERNELLED, EMPTY = range(4)  # how a step ended; the others: why there is no posterior
+# how a step ended; the others: why there is no posterior
+FINE, PANELLED, KERNELLED, EMPTY = range(4)
 MOVES, METER = 0, 1  # which law: of mode j, 2 j + MOVES and 2 j + METER
 
 # Columns of a panel's row that are of the step itself, behind those that are kept.
@@ -76,14 +83,19 @@ COLUMNS = KEPT + 10
 
 POINT = np.concatenate([[-1.0], legendre.legroots(legendre.legder([0] * (Q - 1) + [1])), [1.0]])
 WEIGHT = 2 / (Q * (Q - 1) * legendre.legval(POINT, [0] * (Q - 1) + [1]) ** 2)
-COEFFICIENT = np.linalg.inv(legendre.legvander(POINT, Q - 1))  # of Legendre's polynomials, from values
+# of Legendre's polynomials, from values
+COEFFICIENT = np.linalg.inv(legendre.legvander(POINT, Q - 1))
 LAST, LAST_BUT_ONE = COEFFICIENT[-1].copy(), COEFFICIENT[-2].copy()
 POWER = np.array([legendre.leg2poly(column) for column in COEFFICIENT.T]).T.copy()
-SLOPE = np.array([legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T]).T.copy()
+SLOPE = np.array(
+    [legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T]
+).T.copy()
 
 VALUES, TABLE = types.float64[::1], types.float64[:, ::1]
 # law(which, points, y, constants, x, mean, deviation)
-LAW = types.FunctionType(types.void(types.int64, types.int64, types.float64, VALUES, VALUES, VALUES, VALUES))
+LAW = types.FunctionType(
+    types.void(types.int64, types.int64, types.float64, VALUES, VALUES, VALUES, VALUES)
+)
 
 HALVES = Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial)
 EXP2 = tuple(HALVES.coef.tolist())
@@ -94,14 +106,21 @@ TURN = 2 * np.pi
 
 EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 FAST: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract", "arcp"}}
-# Functions with a `Room` are called from here alone: what would let Python call them takes long to compile.  They allocate
-# nothing, and need not count who holds an array: that took a third of the time.
-INNER: dict[str, Any] = {**FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+# Functions with a `Room` are called from here alone: what would let Python call them takes long to
+# compile.  They allocate nothing, and need not count who holds an array: that took a third of the
+# time.
+INNER: dict[str, Any] = {
+    **FAST,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "_nrt": False,
+}
 
 
 @njit(**EXACT)
 def half(u):
-    """2^-u, |u| < 1021, to 3e-14 of it, by arithmetic that a processor does for many numbers at once."""
+    """2^-u, |u| < 1021, to 3e-14 of it, by arithmetic that a processor does for many numbers at
+    once."""
     whole = SHIFT - u
     r = (SHIFT - whole) - u
     z = r * r
@@ -130,7 +149,8 @@ def density(logarithm):
 
 
 class Setting(NamedTuple):
-    """A model's function, the mode that is looked at, its constants at a step, and the turns of y and x.
+    """A model's function, the mode that is looked at, its constants at a step, and the turns of y
+    and x.
 
     The turn of what is no angle is infinite.
     """
@@ -148,12 +168,13 @@ class Room(NamedTuple):
     ::
 
         panels (PANELS + 4, COLUMNS)
-        kernel (4, KERNELS): rate r and r times centre, of half((r x - r centre)^2); weight, and the weight
-            of the factor u^2
+        kernel (4, KERNELS): rate r and r times centre, of half((r x - r centre)^2); weight, and
+            the weight of the factor u^2
         group (3, KERNELS / Q): of Q kernels, where they begin and end, their least deviation
-        edge (3, 4 PANELS): a place; +1 where a law begins, -1 where it ends, 0 at a border; a deviation
-        later: three vectors (KERNELS,), what later measurements tell, as points, weights, deviations;
-            or laws whose moments are asked for
+        edge (3, 4 PANELS): a place; +1 where a law begins, -1 where it ends, 0 at a border; a
+            deviation
+        later: three vectors (KERNELS,), what later measurements tell, as points, weights,
+            deviations; or laws whose moments are asked for
         stack (2, TURNS + 2): parts of a panel that wait
         point, work: four vectors (Q,) each, the first for arguments and results of the law
     """
@@ -169,7 +190,8 @@ class Room(NamedTuple):
 
 
 class Sum(NamedTuple):
-    """How much of the room a prediction takes: groups, edges, a bound of its density; an error of it."""
+    """How much of the room a prediction takes: groups, edges, a bound of its density; an error of
+    it."""
 
     groups: int
     edges: int
@@ -185,10 +207,11 @@ def points(left, right, x):
 
 @njit(**INNER)
 def residual(model, which, y, spread, point):
-    """At a panel's points: z = (y - b) / sigma, q with ln p(y | x) = q - z^2 / 2, a turn in deviations.
+    """At a panel's points: z = (y - b) / sigma, q with ln p(y | x) = q - z^2 / 2, a turn in
+    deviations.
 
-    z is 1e100 where no noise makes y, and at a single state without noise, as it has no mass.  A missing
-    y (NaN) tells nothing: z = q = 0.
+    z is 1e100 where no noise makes y, and at a single state without noise, as it has no mass.  A
+    missing y (NaN) tells nothing: z = q = 0.
     """
     x, z, q, turn = point
     model.law(2 * model.mode + which, Q, y, model.constants, x, z, q)
@@ -215,7 +238,8 @@ def short_way(z, turn):
 
 @njit(**FAST)
 def log_likelihood(z, q, turn):
-    """ln p(y | x); of an angle the law is wound around the circle: densities of all turns add up."""
+    """ln p(y | x); of an angle the law is wound around the circle: densities of all turns add
+    up."""
     z = abs(short_way(z, turn))
     total, k = 1.0, 1
     while turn < np.inf and k <= WOUND:
@@ -335,7 +359,8 @@ def depth(z, turn, i):
 
 @njit(**INNER)
 def search(model, which, y, spread, room, n):
-    """Halves n panels until no hump of the likelihood is hidden between two points: their number."""
+    """Halves n panels until no hump of the likelihood is hidden between two points: their
+    number."""
     P, (x, z, q, turn) = room.panels, room.point
     best, p, shortest = -np.inf, 0, ROUNDING * (P[n - 1, RIGHT] - P[0, LEFT])
     while p < n:
@@ -365,7 +390,8 @@ def search(model, which, y, spread, room, n):
 
 @njit(**INNER)
 def weighed(P, n, likeliest, peak):
-    """Shares of the panels, and of the density the integral, mean from the middle of a panel, variance."""
+    """Shares of the panels, and of the density the integral, mean from the middle of a panel,
+    variance."""
     total = mean = variance = 0.0
     for p in range(n):
         total += P[p, MASS] * exp(max(P[p, HIGH] - peak, -700.0))
@@ -403,7 +429,8 @@ def sorted_rows(P, n, whole):
 
 @njit(**INNER)
 def grown(P, n, height, whole):
-    """Factor by which a measurement changes the mass in the prediction's tails: p(y | tails) / p(y).
+    """Factor by which a measurement changes the mass in the prediction's tails: p(y | tails) /
+    p(y).
 
     What panels have lost lies there.  It grows where measurements lead to where the state was never
     thought to be, by and by or at once: so a record that contradicts the model is known.
@@ -423,7 +450,8 @@ def grown(P, n, height, whole):
 def lacking(room, groups, place, top):
     """Error by each mass that the prediction lacks, if all of it were where the posterior is.
 
-    The prediction, of the logarithm `top`, is nearly nothing where the record contradicts the model.
+    The prediction, of the logarithm `top`, is nearly nothing where the record contradicts the
+    model.
     """
     nearest, away = 0, np.inf
     for g in range(groups):
@@ -437,7 +465,8 @@ def lacking(room, groups, place, top):
 def corrected(model, room, y, n, total, later, accuracy, first, expected, numbers):
     """The posterior from the n first panels: how it ended, and how many are left, in order.
 
-    numbers: mean, variance, ln p(y | the past), estimated error of mean and deviation in deviations.
+    numbers: mean, variance, ln p(y | the past), estimated error of mean and deviation in
+    deviations.
     """
     P = room.panels
     n = search(model, METER, y, 0.0, room, n)
@@ -498,7 +527,11 @@ def corrected(model, room, y, n, total, later, accuracy, first, expected, number
     if not first:
         lost = numbers[LOST] + LEFT_OUT
         numbers[LOST] = lost * expected * grown(P, n, total.height, whole)
-        error += lost * lacking(room, total.groups, origin, top) + REACH * REACH * numbers[LOST] + total.rough
+        error += (
+            lost * lacking(room, total.groups, origin, top)
+            + REACH * REACH * numbers[LOST]
+            + total.rough
+        )
     numbers[MEAN], numbers[VARIANCE] = origin + mean, variance
     numbers[EVIDENCE], numbers[ERROR] = whole, error
     return FINE, sorted_rows(P, n, whole)
@@ -564,7 +597,8 @@ def in_halves(stack, waiting, a, b):
 def kernels(model, weight_law, shift, B, room, total, accuracy):
     """Adds the prediction from panels B to the room: how it ended, and how much it now takes.
 
-    The logarithm of a weight is `shift`; a weight that depends on the state is a law, `weight_law` < 0.
+    The logarithm of a weight is `shift`; a weight that depends on the state is a law, `weight_law`
+    < 0.
     """
     kernel, group, edge, stack = room.kernel, room.group, room.edge, room.stack
     (x, m, s, _), (power, mass, deviation, weight) = room.point, room.work
@@ -598,7 +632,11 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                     slope += SLOPE[i, k] * m[k]
                 blur = abs(slope) / (part * size) * between(before, after, t)
                 # beside a jump or a pole the slope of a point is no measure of a panel's
-                steep, calm, blur = steep or blur > covered, min(calm, s[i]), min(blur, covered / span)
+                steep, calm, blur = (
+                    steep or blur > covered,
+                    min(calm, s[i]),
+                    min(blur, covered / span),
+                )
                 deviation[i] = sqrt(s[i] * s[i] + blur * blur + 1e-300)
                 least = min(least, deviation[i])
                 d += LAST[i] * m[i]
@@ -608,7 +646,11 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
             digits = 10 * ROUNDING * abs(m[0])
             rough = max(abs(d) + abs(e) + abs(f) + abs(g) - digits, 0.0) / least
             # a measurement may ask for what has little share
-            gaps = covered > span * least or sqrt(share) * rough > 0.03 * accuracy or (steep and covered > calm)
+            gaps = (
+                covered > span * least
+                or sqrt(share) * rough > 0.03 * accuracy
+                or (steep and covered > calm)
+            )
             if share > 1e-10 and gaps and part > 1e-9:
                 waiting = in_halves(stack, waiting, a, b)
                 continue
@@ -645,7 +687,8 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
 
 @njit(**INNER)
 def borders(room, many):
-    """First panels, between edges of the prediction that are far enough from one another: how many."""
+    """First panels, between edges of the prediction that are far enough from one another: how
+    many."""
     edge, P = room.edge, room.panels
     for i in range(1, many):
         while i and edge[0, i - 1] > edge[0, i]:
@@ -801,7 +844,8 @@ def mixed(numbers):
 
 @njit(**INNER)
 def prediction(law, mode, constants, turns, posterior, begin, numbers, weight, room, accuracy):
-    """The sum of kernels from the posteriors of all modes to one: how it ended, how much room it takes.
+    """The sum of kernels from the posteriors of all modes to one: how it ended, how much room it
+    takes.
 
     weight : probabilities of transitions (J, J), negative where they depend on the state.
     """
@@ -823,7 +867,21 @@ ADVANCE = types.Tuple((TABLE, types.int64[::1]))(
 
 
 @njit(ADVANCE, cache=True, nogil=True, error_model="numpy")
-def advance(law, constants, turns, y, prior, before, begin, later, later_begin, transitions, back, accuracy, numbers):
+def advance(
+    law,
+    constants,
+    turns,
+    y,
+    prior,
+    before,
+    begin,
+    later,
+    later_begin,
+    transitions,
+    back,
+    accuracy,
+    numbers,
+):
     """One step of some trajectories, forward, or back.
 
     Parameters
@@ -845,12 +903,14 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
     back : bool
     accuracy : float
     numbers : ndarray (T J, NUMBERS)
-        Of the step before; PROBABILITY is used; looking back MEAN and VARIANCE of the next.  Is filled.
+        Of the step before; PROBABILITY is used; looking back MEAN and VARIANCE of the next.  Is
+        filled.
 
     Returns
     -------
     panels : ndarray (rows, KEPT)
-        The posterior of each mode of each trajectory, one below the other; begin : where they begin.
+        The posterior of each mode of each trajectory, one below the other; begin : where they
+        begin.
     """
     room = room_for_a_step()
     T, modes = len(y), len(prior)
@@ -869,7 +929,16 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
                 n = 2 if prior[j, 2] > 0 else 0
             else:
                 status, total = prediction(
-                    law, j, constants[1], turns, before, begin[start:], known, transitions[modes:], room, accuracy
+                    law,
+                    j,
+                    constants[1],
+                    turns,
+                    before,
+                    begin[start:],
+                    known,
+                    transitions[modes:],
+                    room,
+                    accuracy,
                 )
                 n = borders(room, total.edges) if status == FINE and total.edges else 0
             if back and n:
@@ -878,7 +947,18 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
                 status = status if later_count or not len(rows) else KERNELLED
             kept, here[j, EVIDENCE], here[j, LOST] = 0, -np.inf, lost
             if status == FINE and n:
-                status, kept = corrected(model, room, y[t], n, total, later_count, accuracy, first, known[j, EXPECTED], here[j])
+                status, kept = corrected(
+                    model,
+                    room,
+                    y[t],
+                    n,
+                    total,
+                    later_count,
+                    accuracy,
+                    first,
+                    known[j, EXPECTED],
+                    here[j],
+                )
             here[j, STATUS] = status
             if used + kept > len(after):
                 more = np.empty((2 * len(after) + kept, KEPT))
@@ -893,7 +973,16 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
         mixed(here)
         for j in range(0 if back else modes):
             status, total = prediction(
-                law, j, constants[0], turns, after, places[start:], here, transitions[:modes], room, accuracy
+                law,
+                j,
+                constants[0],
+                turns,
+                after,
+                places[start:],
+                here,
+                transitions[:modes],
+                room,
+                accuracy,
             )
             mass, mean, variance = moments(room, of_kernels(total, room), turns[1])
             here[j, NEXT_MEAN], here[j, NEXT_VARIANCE] = mean, variance

@@ -1,4 +1,5 @@
-"""The exact filter of scalar models, with modes or without: what `panels` computes, as a `Filter`."""
+"""The exact filter of scalar models, with modes or without: what `panels` computes, as a
+`Filter`."""
 
 from __future__ import annotations
 
@@ -34,8 +35,8 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
-# Of the mean and the deviation at a step, in posterior deviations: their square, 1e-6 of the bound, is
-# far below what any number of trajectories tells.
+# Of the mean and the deviation at a step, in posterior deviations: their square, 1e-6 of the bound,
+# is far below what any number of trajectories tells.
 ACCURACY = 1e-3
 FINEST = 1e-6  # what a sum of eight kernels over five deviations allows
 TOLERABLE = 0.1  # error of a step, in deviations, beyond which there is no posterior
@@ -43,7 +44,8 @@ CHUNK = 64  # trajectories that a thread takes at once: some milliseconds
 SHARPEST = 1e-7  # deviation of a prior without variance, in units of its mean, or of 1
 NEGLIGIBLE = 1e-12  # probability of a mode whose density need not be found
 REASONS = (
-    "its error is above a tenth of a deviation: the measurement contradicts the model, or digits are lost",
+    "its error is above a tenth of a deviation: the measurement contradicts the model, or digits "
+    "are lost",
     "the posterior needs too many panels",
     "the prediction needs too many kernels",
     "no state explains the measurement",
@@ -89,7 +91,8 @@ class PointMass(NamedTuple):
         return self.numbers[:, :, EXPECTED]
 
     def density(self, run: int, mode: int = 0) -> tuple[Array, Array]:
-        """States x (M,), ascending, at which a trajectory's posterior is held, and p(x, mode) there."""
+        """States x (M,), ascending, at which a trajectory's posterior is held, and p(x, mode)
+        there."""
         from kfcourse.filters.exact.panels import POINT
 
         place = run * self.numbers.shape[1] + mode
@@ -99,7 +102,8 @@ class PointMass(NamedTuple):
         return x.ravel(), np.exp(rows[:, :Q]).ravel() * self.probability[run, mode]
 
     def evidence_error(self) -> Array:
-        """Estimated error of `log_likelihood`, (runs,): a density's total errs by no more than it does."""
+        """Estimated error of `log_likelihood`, (runs,): a density's total errs by no more than it
+        does."""
         return self.error
 
     def discretisation_error(self) -> Array:
@@ -113,9 +117,9 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
     Parameters
     ----------
     model : Model or JumpModel
-        One state, one measurement, noises entering linearly (with any functions of x as factors); the
-        meter's may be one that can be solved for, as in y = exp(x + w).  Of a model with modes, all of
-        which are such, `state.memory.probability` are their posterior probabilities.
+        One state, one measurement, noises entering linearly (with any functions of x as factors);
+        the meter's may be one that can be solved for, as in y = exp(x + w).  Of a model with modes,
+        all of which are such, `state.memory.probability` are their posterior probabilities.
     accuracy : float
         Error of a step's mean and deviation, in posterior deviations, at most.
 
@@ -124,8 +128,9 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
     ModelError
         The model is not scalar, a noise enters nonlinearly, or object or meter have none.
     Unresolved
-        When it runs: a step whose error is above a tenth of a deviation.  A record that contradicts the
-        model makes one, where a state is more than some six deviations from where it was predicted.
+        When it runs: a step whose error is above a tenth of a deviation.  A record that contradicts
+        the model makes one, where a state is more than some six deviations from where it was
+        predicted.
 
     Notes
     -----
@@ -136,7 +141,9 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         raise ModelError(f"the exact filter needs {FINEST:g} <= accuracy < 1, got {accuracy}")
     modes = modes_of(model)
     if len(modes) > 1 and model.angles.x:
-        raise ModelError("the exact filter over modes holds no state that is an angle; use particle(model)")
+        raise ModelError(
+            "the exact filter over modes holds no state that is an angle; use particle(model)"
+        )
     exact = _Exact(model, printed(model), accuracy)
     back = exact.look_back if len(modes) == 1 else None
     return Filter("aof-exact", modes[0], exact.init, exact.step, evidence=_evidence, look_back=back)
@@ -188,7 +195,9 @@ class _Exact:
                 panels, begin, numbers = self._advance(k, y[k, :, 0], before, state.memory)
                 memory = filtered._replace(panels=panels, begin=begin, numbers=numbers)
                 law = _law(numbers, MEAN, memory.probability)
-                self._check(f"looking back to step {k}", memory, filtered.probability, _error(numbers, law))
+                self._check(
+                    f"looking back to step {k}", memory, filtered.probability, _error(numbers, law)
+                )
                 error = error + _error(numbers, law)
                 memory = memory._replace(error=filtered.error + error, variance=law.cov[:, 0, 0])
                 state = State(k + 1, law, law, memory)
@@ -204,18 +213,22 @@ class _Exact:
         return np.array([[mean, deviation, chance] for chance in chances], dtype=float)
 
     def _transitions(self, k: int) -> Array:
-        """Probabilities of transitions from step k, (J, J); negative where they depend on the state."""
+        """Probabilities of transitions from step k, (J, J); negative where they depend on the
+        state."""
         if not isinstance(self.model, JumpModel):
             return np.ones((1, 1))
         if self.model.by_state:
             return np.full(self.model.chain.shape, -1.0)
         return self.model.transition_at(k)
 
-    def _advance(self, k: int, y: Array, before: PointMass, later: PointMass | None = None) -> tuple[Array, Array, Array]:
-        """Panels of the posteriors at step k, where they begin, their numbers; looking back from `later`.
+    def _advance(
+        self, k: int, y: Array, before: PointMass, later: PointMass | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Panels of the posteriors at step k, where they begin, their numbers; looking back from
+        `later`.
 
-        Threads take some trajectories each.  What they compute does not depend on how many there are;
-        joblib's workers have one each.
+        Threads take some trajectories each.  What they compute does not depend on how many there
+        are; joblib's workers have one each.
         """
         from numba import config
 
@@ -233,10 +246,20 @@ class _Exact:
             runs = slice(start, start + CHUNK)
             ends = slice(start * size, (start + CHUNK) * size + 1)
             return advance(
-                law, now_and_then, turns, values[runs], prior,
-                before.panels, before.begin[ends], ahead.panels, ahead.begin[ends],
-                chain, later is not None, self.accuracy, numbers[runs].reshape(-1, NUMBERS),
-            )  # fmt: skip
+                law,
+                now_and_then,
+                turns,
+                values[runs],
+                prior,
+                before.panels,
+                before.begin[ends],
+                ahead.panels,
+                ahead.begin[ends],
+                chain,
+                later is not None,
+                self.accuracy,
+                numbers[runs].reshape(-1, NUMBERS),
+            )
 
         starts, threads = range(0, len(values), CHUNK), config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         if len(starts) == 1 or threads == 1:
@@ -256,7 +279,10 @@ class _Exact:
         run = int(np.argmax(wrong))
         statuses = memory.numbers[run, empty[run], STATUS].astype(int)
         reason = REASONS[statuses[0] or len(REASONS) - 1] if len(statuses) else REASONS[0]
-        raise Unresolved(f"{where} of {self.model}, run {run}: {reason}; look at the measurement, or leave the exact filter out")
+        raise Unresolved(
+            f"{where} of {self.model}, run {run}: {reason}; look at the measurement, or leave the "
+            f"exact filter out"
+        )
 
 
 def _law(numbers: Array, mean: int, probability: Array) -> Gaussian:
@@ -278,5 +304,6 @@ def _error(numbers: Array, law: Gaussian) -> Array:
     """
     sd, apart = np.sqrt(numbers[:, :, VARIANCE]), np.abs(numbers[:, :, MEAN] - law.mean)
     moved = numbers[:, :, PROBABILITY] * numbers[:, :, ERROR] * (sd + apart)
-    with np.errstate(invalid="ignore", divide="ignore"):  # what has no posterior is told by `_check`
+    # what has no posterior is told by `_check`
+    with np.errstate(invalid="ignore", divide="ignore"):
         return moved.sum(axis=1) / np.sqrt(law.cov[:, 0, 0])

@@ -23,8 +23,9 @@ DRAWS = 20  # arguments that are tried
 def salted(letter: str, opening: str, name: str, salt: str) -> Exercise:
     """The exercise whose hidden arguments are the grader's.
 
-    Random arguments may be a matrix that is nearly singular: then another right answer, with roundings of its own, differs from
-    ours by more than the tolerance.  So the first arguments are taken for which ours hardly changes with the last digits of them.
+    Random arguments may be a matrix that is nearly singular: then another right answer, with
+    roundings of its own, differs from ours by more than the tolerance.  So the first arguments are
+    taken for which ours hardly changes with the last digits of them.
 
     Parameters
     ----------
@@ -46,7 +47,8 @@ def salted(letter: str, opening: str, name: str, salt: str) -> Exercise:
 
 
 def steady(question: Question, asked: Exercise) -> bool:
-    """Whether the right answer hardly changes when its arguments change by a few units in the last place."""
+    """Whether the right answer hardly changes when its arguments change by a few units in the last
+    place."""
     rng, as_posed = np.random.default_rng(0), posed(question, asked)
     with np.errstate(all="ignore"):
         for values in as_posed.arguments:
@@ -58,12 +60,17 @@ def steady(question: Question, asked: Exercise) -> bool:
 
 
 def _changed(value: Any, rng: np.random.Generator) -> Any:
-    """Numbers changed in the last place, equal ones alike: a symmetric matrix stays so, and what never varies; the rest stays.
+    """Numbers changed in the last place, equal ones alike: a symmetric matrix stays so, and what
+    never varies; the rest stays.
 
-    Whole numbers stay, too.  No rounding has made them, and a matrix of 1 and -1, which takes differences of nearly equal
-    numbers, would take no such any more: where a processor multiplies and adds at once, not even of equal ones.
+    Whole numbers stay, too.  No rounding has made them, and a matrix of 1 and -1, which takes
+    differences of nearly equal numbers, would take no such any more: where a processor multiplies
+    and adds at once, not even of equal ones.
     """
-    if not isinstance(value, float | np.floating | np.ndarray) or np.asarray(value).dtype.kind != "f":
+    if (
+        not isinstance(value, float | np.floating | np.ndarray)
+        or np.asarray(value).dtype.kind != "f"
+    ):
         return copy.deepcopy(value)
     different, place = np.unique(value, return_inverse=True)
     signs = rng.choice((-1.0, 1.0), different.shape) * (different != np.round(different))

@@ -59,11 +59,13 @@ class Channel:
 
 
 class PatientChannel(Channel):
-    """A channel that waits no longer than it is told, on every system: a thread of its own receives."""
+    """A channel that waits no longer than it is told, on every system: a thread of its own
+    receives."""
 
     def __init__(self, source: IO[bytes], sink: IO[bytes]):
         super().__init__(source, sink)
-        self._queue: queue.Queue[dict[str, Any] | Exception] = queue.Queue(maxsize=100)  # a flood waits in the pipe
+        # a flood waits in the pipe
+        self._queue: queue.Queue[dict[str, Any] | Exception] = queue.Queue(maxsize=100)
         threading.Thread(target=self._forward, daemon=True).start()
 
     def _forward(self) -> None:

@@ -1,4 +1,5 @@
-"""Grading what a course returned: from the folder to the table, the report and what stands on the screen."""
+"""Grading what a course returned: from the folder to the table, the report and what stands on the
+screen."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ def grade_folder(
     parts: float,
     follow_on: float,
 ) -> bool:
-    """Grade the notebooks of a folder as `kfcourse grade` is asked to; whether all could be graded."""
+    """Grade the notebooks of a folder as `kfcourse grade` is asked to; whether all could be
+    graded."""
     course = None if students is None else _course(students, variants_file)
     folder, masters = folder.resolve(), masters and masters.resolve()
     work = returned(folder, seconds, variants_file, masters, _given(course))
@@ -58,10 +60,15 @@ def grade_folder(
     table = out or folder.with_name(f"{folder.name}-grades.csv")
     pages = report or folder.with_name(f"{folder.name}-report")
     if table.suffix == ".jsonl":
-        raise ValueError(f"--out {table}: the grades themselves are written there; end the table's name in .csv")
+        raise ValueError(
+            f"--out {table}: the grades themselves are written there; end the table's name in .csv"
+        )
     for path in (table, pages):
         if path.resolve().is_relative_to(folder):
-            raise ValueError(f"{path} is inside of what was returned: a student may have put it there; name another place")
+            raise ValueError(
+                f"{path} is inside of what was returned: a student may have put it there; name "
+                f"another place"
+            )
     salt, protection = seed or secrets.token_hex(8), ["nothing was run"]
 
     def run(new: Sequence[Returned]) -> Iterator[Grade]:
@@ -82,7 +89,9 @@ def grade_folder(
         click.echo(f"\nReport of {len(persons)} students: {pages / 'overview.html'}")
         for person in persons:
             if person.flags:
-                click.echo(f"look at {clean(person.student.name)}: {clean('; '.join(person.flags), 200)}")
+                click.echo(
+                    f"look at {clean(person.student.name)}: {clean('; '.join(person.flags), 200)}"
+                )
         for letter, names in same_code(persons):
             click.echo(f"set {letter}: the same code came from {clean(', '.join(names))}")
     return all(grade.status not in (FAILED, PARTLY) for grade in grades)
@@ -94,8 +103,14 @@ def _problem(site: pool.Site) -> str:
 
 
 def _warn(problem: str) -> None:
-    """Say loudly what a run without a sandbox risks, and ask whether to go on if nobody said so; ValueError if nobody does."""
-    click.secho(f"{problem}{'. ' * bool(problem)}The protection would be {PROTECTION['none']}.", fg="red", bold=True, err=True)
+    """Say loudly what a run without a sandbox risks, and ask whether to go on if nobody said so;
+    ValueError if nobody does."""
+    click.secho(
+        f"{problem}{'. ' * bool(problem)}The protection would be {PROTECTION['none']}.",
+        fg="red",
+        bold=True,
+        err=True,
+    )
     if problem and not (sys.stdin.isatty() and click.confirm("Run them all the same?", err=True)):
         raise ValueError("no notebook was run; --sandbox none runs them without protection")
 
@@ -106,13 +121,21 @@ def _course(path: Path, variants_file: Path | None) -> list[Student]:
     course = read_assignment(path, known)
     for student in course:
         if student.variant not in known:
-            hint = f"there are {', '.join(known)}" if variants_file else "name the file that you handed out with --variants"
-            raise ValueError(f"{path} gives {student.name} the variant {student.variant}, which is not known; {hint}")
+            hint = (
+                f"there are {', '.join(known)}"
+                if variants_file
+                else "name the file that you handed out with --variants"
+            )
+            raise ValueError(
+                f"{path} gives {student.name} the variant {student.variant}, which is not known; "
+                f"{hint}"
+            )
     return course
 
 
 def _given(course: Sequence[Student] | None) -> Callable[[str, Path], str]:
-    """The variant that was given to the student of a notebook; nothing without a list, or if the student is not in it."""
+    """The variant that was given to the student of a notebook; nothing without a list, or if the
+    student is not in it."""
 
     def given(name: str, path: Path) -> str:
         whose = owner(Grade(name, ""), course or ())
@@ -127,11 +150,16 @@ def _given(course: Sequence[Student] | None) -> Callable[[str, Path], str]:
 
 
 def grade_all(
-    work: Sequence[Returned], table: Path, again: bool, run: Callable[[Sequence[Returned]], Iterator[Grade]]
+    work: Sequence[Returned],
+    table: Path,
+    again: bool,
+    run: Callable[[Sequence[Returned]], Iterator[Grade]],
 ) -> tuple[list[Grade], int]:
-    """Grade what is new, and write each grade when it comes: an interrupted run goes on where it was.
+    """Grade what is new, and write each grade when it comes: an interrupted run goes on where it
+    was.
 
-    Beside the table, with the ending `.jsonl`, stand the grades; the table is made from them, however the run ends.
+    Beside the table, with the ending `.jsonl`, stand the grades; the table is made from them,
+    however the run ends.
 
     Returns
     -------
@@ -143,7 +171,10 @@ def grade_all(
     grades = [replace(known[one.digest], name=one.name) for one in work if one.digest in known]
     old, new = len(grades), [one for one in work if one.digest not in known]
     write_lines(grades, lines)
-    waiting = {one.name: Grade(one.name, FAILED, notes=("the run ended before it was graded",)) for one in new}
+    waiting = {
+        one.name: Grade(one.name, FAILED, notes=("the run ended before it was graded",))
+        for one in new
+    }
     try:
         with lines.open("a", encoding="utf-8") as file:
             for grade in run(new) if new else ():
@@ -178,5 +209,7 @@ def _signs() -> dict[str, str]:
     try:
         "".join(SIGNS.values()).encode(getattr(sys.stdout, "encoding", None) or "ascii")
     except (UnicodeEncodeError, LookupError):
-        return {mark: {"✓": "+", "✗": "x", "–": "-"}.get(sign, sign) for mark, sign in SIGNS.items()}
+        return {
+            mark: {"✓": "+", "✗": "x", "–": "-"}.get(sign, sign) for mark, sign in SIGNS.items()
+        }
     return SIGNS

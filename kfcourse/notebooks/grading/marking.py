@@ -1,8 +1,9 @@
 """Marking one returned notebook: what passed, and what the wrong answers look like.
 
-Nothing of a returned notebook is trusted but the student's own cells.  The notebook of its set and variant is made again from
-the master, and the student's cells are put into it.  It runs in a process of its own, which has neither keys nor questions: it
-is asked for the values of the student's functions, at arguments that nobody has seen before, and this process compares them.
+Nothing of a returned notebook is trusted but the student's own cells.  The notebook of its set and
+variant is made again from the master, and the student's cells are put into it.  It runs in a
+process of its own, which has neither keys nor questions: it is asked for the values of the
+student's functions, at arguments that nobody has seen before, and this process compares them.
 """
 
 from __future__ import annotations
@@ -25,8 +26,26 @@ from kfcourse.checks.question import MISSING, NOT_CHECKED, UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import Step, assembled, generated, lost
-from kfcourse.notebooks.grading.results import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Comment, Grade
-from kfcourse.notebooks.grading.running import KILLED, WHOLE, Answer, Kernel, Killed, Opening, Site, Stopped
+from kfcourse.notebooks.grading.results import (
+    FAILED,
+    GRADED,
+    NOT_GRADED,
+    NOT_RUN,
+    OTHER,
+    PARTLY,
+    Comment,
+    Grade,
+)
+from kfcourse.notebooks.grading.running import (
+    KILLED,
+    WHOLE,
+    Answer,
+    Kernel,
+    Killed,
+    Opening,
+    Site,
+    Stopped,
+)
 from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
 from kfcourse.notebooks.grading.submissions import (
     EXPORT,
@@ -94,7 +113,9 @@ def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
     return None
 
 
-def _grade(work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, start: Any) -> Grade:
+def _grade(
+    work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, start: Any
+) -> Grade:
     code = [cell for cell in cells if cell.code]
     with time_limit(WHOLE * work.seconds):
         exercise, looks = claimed(claim, code, work.variants_file, work.variant)
@@ -107,7 +128,8 @@ def _grade(work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, 
         marking.run(kernel, steps)
     functions = {question.function for question in exercise.questions.values()}
     comments = {
-        name: Comment(result.message, result.diagnosis, result.share, result.follows) for name, result in marking.results.items()
+        name: Comment(result.message, result.diagnosis, result.share, result.follows)
+        for name, result in marking.results.items()
     }
     status, digest = (PARTLY, "") if NOT_GRADED in marking.marks.values() else (GRADED, work.digest)
     return Grade(
@@ -132,7 +154,11 @@ def code_of(own: Iterable[Cell], functions: Container[str]) -> str:
         for node in (syntax(cell.source) or ast.Module([], [])).body:
             if isinstance(node, ast.FunctionDef) and node.name in functions:
                 lines = io.StringIO(ast.get_source_segment(cell.source, node) or "")
-                words = (token.string for token in tokenize.generate_tokens(lines.readline) if token.type != tokenize.COMMENT)
+                words = (
+                    token.string
+                    for token in tokenize.generate_tokens(lines.readline)
+                    if token.type != tokenize.COMMENT
+                )
                 answers.append(" ".join(" ".join(words).split()))
     return hashlib.sha256("\n".join(sorted(answers)).encode()).hexdigest()[:16] if answers else ""
 
@@ -155,7 +181,9 @@ class Marking:
     def __init__(self, exercise: Exercise, salt: str, gone: Mapping[str, str] | None = None):
         self._exercise, self._salt = exercise, salt
         named = {question.function: name for name, question in exercise.questions.items()}
-        self._gone = {named[function]: fate for function, fate in (gone or {}).items() if function in named}
+        self._gone = {
+            named[function]: fate for function, fate in (gone or {}).items() if function in named
+        }
         self.marks = dict.fromkeys(exercise.questions, NOT_RUN)
         self.results: dict[str, Result] = {}
         self.notes = [f"the cell of {name} {fate}" for name, fate in self._gone.items()]
@@ -171,7 +199,8 @@ class Marking:
                 ran = kernel.cell(step.source, step.names)
             except Stopped as reason:
                 for name, mark in self.marks.items():
-                    if mark == NOT_RUN and isinstance(reason, Killed):  # what would have come is not known
+                    # what would have come is not known
+                    if mark == NOT_RUN and isinstance(reason, Killed):
                         self._not_graded(name, f"{step.where}: {reason}")
                     elif mark == NOT_RUN:
                         self._not_run(name, f"{step.where}: {reason}")
@@ -204,7 +233,11 @@ class Marking:
         if result.status == MISSING and self._gone:
             gone = self._gone.get(name)
             others = ", ".join(other for other in self._gone if other != name)
-            says = f"its cell {gone}" if gone else f"{result.message}, or stands on what is not there: the cell of {others}"
+            says = (
+                f"its cell {gone}"
+                if gone
+                else f"{result.message}, or stands on what is not there: the cell of {others}"
+            )
             result = Result(name, result.title, MISSING, says)
         self.results[name], self.marks[name] = result, result.status
         if result.status == UNUSABLE:
@@ -220,16 +253,24 @@ class Marking:
 
     def _not_graded(self, name: str, reason: str) -> None:
         title = self._exercise.questions[name].title
-        self.results[name], self.marks[name] = Result(name, title, NOT_GRADED, LOOKED_AT), NOT_GRADED
+        self.results[name], self.marks[name] = (
+            Result(name, title, NOT_GRADED, LOOKED_AT),
+            NOT_GRADED,
+        )
         self._failed.setdefault(f"not graded: {reason}", []).append(name)
 
     def looks(self) -> list[str]:
         """Which answers are not graded, and why."""
-        return [clean(f"{', '.join(names)} {reason}", 500) for reason, names in self._failed.items()]
+        return [
+            clean(f"{', '.join(names)} {reason}", 500) for reason, names in self._failed.items()
+        ]
 
     def reasons(self) -> list[str]:
         """What the wrong answers look like."""
-        return [clean(f"{', '.join(questions)}: {reason}") for reason, questions in self._reasons.items()]
+        return [
+            clean(f"{', '.join(questions)}: {reason}")
+            for reason, questions in self._reasons.items()
+        ]
 
 
 STRANGE = re.compile(
@@ -239,7 +280,8 @@ STRANGE = re.compile(
 
 
 def strange_lines(own: Iterable[Cell], master: NotebookNode) -> list[str]:
-    """Lines of the student's that reach for more than an exercise needs: what the package computes, or a tick of one's own."""
+    """Lines of the student's that reach for more than an exercise needs: what the package computes,
+    or a tick of one's own."""
     usual = {line.strip() for cell in master.cells for line in cell.source.splitlines()}
     strange = [
         clean(f"{cell.name}: {line.strip()}")

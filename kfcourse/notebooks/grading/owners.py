@@ -1,4 +1,5 @@
-"""Whose notebook is it?  And what a lecturer should look at: another variant, missing work, the same code twice."""
+"""Whose notebook is it?  And what a lecturer should look at: another variant, missing work, the
+same code twice."""
 
 from __future__ import annotations
 
@@ -42,16 +43,23 @@ def words(text: str) -> list[str]:
 
 
 def owner(grade: Grade, students: Sequence[Student]) -> Student | None:
-    """Whose notebook it is: by the names in its path, else by whom it was handed out to; None if that is not clear.
+    """Whose notebook it is: by the names in its path, else by whom it was handed out to; None if
+    that is not clear.
 
-    A student is found in a folder or file that has all words of the name, in any order: `group/Name`, or the folders of a
-    learning platform.  Of several, those whose group is in the path go first, then those with the longest names.
+    A student is found in a folder or file that has all words of the name, in any order:
+    `group/Name`, or the folders of a
+    learning platform.  Of several, those whose group is in the path go first, then those with the
+    longest names.
     """
     parts = [set(words(part)) for part in PurePosixPath(grade.name).with_suffix("").parts]
     everything = set().union(*parts)
-    named = [student for student in students if any(set(words(student.name)) <= part for part in parts)]
+    named = [
+        student for student in students if any(set(words(student.name)) <= part for part in parts)
+    ]
     if not named:
-        named = [student for student in students if grade.student == f"{student.name}, {student.group}"]
+        named = [
+            student for student in students if grade.student == f"{student.name}, {student.group}"
+        ]
 
     def rank(student: Student) -> tuple[bool, int]:
         return set(words(student.group)) <= everything, len(words(student.name))
@@ -61,7 +69,8 @@ def owner(grade: Grade, students: Sequence[Student]) -> Student | None:
 
 
 def of_folder(grade: Grade) -> Student:
-    """Whose notebook it is where there is no list: a folder is a student, or a file beside no other."""
+    """Whose notebook it is where there is no list: a folder is a student, or a file beside no
+    other."""
     path = PurePosixPath(grade.name)
     if not path.parent.name:
         return Student(path.stem, "", "")
@@ -74,8 +83,8 @@ def people(
 ) -> tuple[list[Person], list[Grade]]:
     """Every student with the notebooks that came back, and the notebooks that belong to nobody.
 
-    `students` is the course list; without it every folder is a student.  Of several notebooks of a set the one counts that is
-    worth most by the `credit`.
+    `students` is the course list; without it every folder is a student.  Of several notebooks of a
+    set the one counts that is worth most by the `credit`.
     """
     persons = {student: Person(student) for student in students or ()}
     strangers = []
@@ -89,7 +98,11 @@ def people(
             _hand_in(persons.setdefault(whose, Person(whose)), grade, credit)
     everything = {letter for person in persons.values() for letter in person.grades}
     for person in persons.values():
-        missing = [letter for letter in person.student.sets.split() or sorted(everything) if letter not in person.grades]
+        missing = [
+            letter
+            for letter in person.student.sets.split() or sorted(everything)
+            if letter not in person.grades
+        ]
         if missing:
             person.flags.append(f"missing: {', '.join(missing)}")
     return list(persons.values()), strangers
@@ -115,7 +128,8 @@ def _hand_in(person: Person, grade: Grade, credit: Credit) -> None:
 
 
 def same_code(persons: Iterable[Person]) -> list[tuple[str, list[str]]]:
-    """Groups of students whose code differs in nothing but comments and spaces: the set, and their names."""
+    """Groups of students whose code differs in nothing but comments and spaces: the set, and their
+    names."""
     groups: dict[tuple[str, str], list[str]] = {}
     for person in persons:
         for letter, grade in person.grades.items():
@@ -126,5 +140,7 @@ def same_code(persons: Iterable[Person]) -> list[tuple[str, list[str]]]:
 
 def known_sets(persons: Iterable[Person]) -> list[str]:
     """Letters of the sets that came back, or should have."""
-    back = {letter for person in persons for letter in (*person.grades, *person.student.sets.split())}
+    back = {
+        letter for person in persons for letter in (*person.grades, *person.student.sets.split())
+    }
     return [letter for letter in sets() if letter in back]

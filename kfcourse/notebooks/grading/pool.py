@@ -1,6 +1,7 @@
 """Grading processes: each holds the right answers and compares, one notebook after another.
 
-A notebook that ends its grading process, or makes it hang, is not graded; a new process goes on with the next one.
+A notebook that ends its grading process, or makes it hang, is not graded; a new process goes on
+with the next one.
 """
 
 from __future__ import annotations
@@ -30,11 +31,14 @@ from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import Returned
 
-QUIET = 600.0  # seconds for what is ours: making the notebook of a variant, comparing, searching for the kinds of mistakes
+# seconds for what is ours: making the notebook of a variant, comparing, searching for the kinds of
+# mistakes
+QUIET = 600.0
 
 
 class Grader:
-    """A grading process, started when there is something to grade, and anew when a notebook has ended it."""
+    """A grading process, started when there is something to grade, and anew when a notebook has
+    ended it."""
 
     def __init__(self, setting: Setting):
         self._setting = setting
@@ -44,7 +48,9 @@ class Grader:
     def __call__(self, work: Returned) -> Grade:
         try:
             if self._pool is None:
-                context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
+                context = multiprocessing.get_context(
+                    "forkserver" if sys.platform == "linux" else "spawn"
+                )
                 context.set_forkserver_preload([__name__, "kfcourse.exercises"])
                 self._pool = ProcessPoolExecutor(1, context, _begin)
                 self._pid = self._pool.submit(os.getpid).result()
@@ -53,7 +59,10 @@ class Grader:
         except TimeoutError:
             problem = "the grading process hung"
         except BrokenProcessPool:
-            problem = "the grading process was killed, by the notebook, by somebody else, or for want of memory"
+            problem = (
+                "the grading process was killed, by the notebook, by somebody else, or for "
+                "want of memory"
+            )
         self.end()
         return Grade(work.name, FAILED, notes=(problem,))
 
@@ -67,7 +76,8 @@ class Grader:
 
 
 def _begin() -> None:
-    """In a new grading process: Ctrl-C and the screen are the command's, and without the command it ends."""
+    """In a new grading process: Ctrl-C and the screen are the command's, and without the command it
+    ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
@@ -85,10 +95,16 @@ def _begin() -> None:
 
 @contextmanager
 def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Site]:
-    """Where notebooks run: a copy of the package without the answers, and the sandbox that hides the rest."""
+    """Where notebooks run: a copy of the package without the answers, and the sandbox that hides
+    the rest."""
     with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
         staged = stage(Path(made).resolve())
-        hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder, *([masters] if masters else [])]
+        hidden = [
+            Path(str(resources.files("kfcourse"))),
+            *answers(),
+            folder,
+            *([masters] if masters else []),
+        ]
         yield Site(staged, Sandbox(kind, tuple(str(path.resolve()) for path in hidden)))
 
 
@@ -109,7 +125,9 @@ def graded(works: Sequence[Returned], setting: Setting, workers: int) -> Iterato
     threads = ThreadPoolExecutor(workers)
     try:
         tasks = [threads.submit(grade, work) for work in works]
-        for task in tqdm(as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None):
+        for task in tqdm(
+            as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None
+        ):
             yield task.result()
     finally:
         threads.shutdown(wait=False, cancel_futures=True)

@@ -1,4 +1,5 @@
-"""What comes of a course: tables of students and questions, a page for each student, and an overview."""
+"""What comes of a course: tables of students and questions, a page for each student, and an
+overview."""
 
 from __future__ import annotations
 
@@ -18,7 +19,16 @@ from kfcourse.files import save
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading.owners import Person, known_sets, people, same_code
 from kfcourse.notebooks.grading.results import NOT_GRADED, NOT_RUN, SIGNS, Comment, Grade
-from kfcourse.notebooks.grading.weights import USUAL, WEIGHTS, Credit, points, possible, questions, tidy, worth
+from kfcourse.notebooks.grading.weights import (
+    USUAL,
+    WEIGHTS,
+    Credit,
+    points,
+    possible,
+    questions,
+    tidy,
+    worth,
+)
 from kfcourse.notebooks.texts import write_csv
 
 KINDS = {
@@ -71,7 +81,8 @@ def write_report(
 
 
 def feedback_pages(persons: Iterable[Person]) -> list[Path]:
-    """A page for each person in the folder of the report; names that differ in signs alone get numbers."""
+    """A page for each person in the folder of the report; names that differ in signs alone get
+    numbers."""
     pages: dict[str, Path] = {}
     for person in persons:
         page, number = Path("feedback", person.student.folder), 1
@@ -82,52 +93,78 @@ def feedback_pages(persons: Iterable[Person]) -> list[Path]:
     return list(pages.values())
 
 
-def student_rows(persons: Iterable[Person], letters: Sequence[str], credit: Credit = USUAL) -> list[dict[str, Any]]:
+def student_rows(
+    persons: Iterable[Person], letters: Sequence[str], credit: Credit = USUAL
+) -> list[dict[str, Any]]:
     """A row for each student: points of each set, of each level, and in all; what to look at."""
     rows = []
     for person in persons:
         student, grades = person.student, person.grades
         came = list(grades.values())
-        row: dict[str, Any] = {"name": student.name, "group": student.group, "variant": student.variant}
-        row |= {f"set {letter}": points([grades[letter]], credit) if letter in grades else "" for letter in letters}
+        row: dict[str, Any] = {
+            "name": student.name,
+            "group": student.group,
+            "variant": student.variant,
+        }
+        row |= {
+            f"set {letter}": points([grades[letter]], credit) if letter in grades else ""
+            for letter in letters
+        }
         row |= {level: points(came, credit, level) for level in WEIGHTS}
-        row |= {"points": points(came, credit), "of": possible(letters), "look at": "; ".join(person.flags)}
+        row |= {
+            "points": points(came, credit),
+            "of": possible(letters),
+            "look at": "; ".join(person.flags),
+        }
         rows.append(row)
     return rows
 
 
 def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dict[str, Any]]:
-    """A row for each question: how many were right, wrong, not usable, not done; the mistakes, commonest first."""
+    """A row for each question: how many were right, wrong, not usable, not done; the mistakes,
+    commonest first."""
     rows = []
     for name, question in questions(letters).items():
         marks = (grade.marks.get(name, MISSING) for grade in _grades_of(persons, name))
         counts = Counter(MISSING if mark == NOT_RUN else mark for mark in marks)
         counts[MISSING] += len(persons) - counts.total()
-        comments = [grade.comments[name] for grade in _grades_of(persons, name) if name in grade.comments]
-        mistakes = Counter(_in_words(question, mistake) for comment in comments for mistake in comment.mistakes).most_common()
+        comments = [
+            grade.comments[name] for grade in _grades_of(persons, name) if name in grade.comments
+        ]
+        mistakes = Counter(
+            _in_words(question, mistake) for comment in comments for mistake in comment.mistakes
+        ).most_common()
         row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
         row |= {label: counts[mark] for mark, label in KINDS.items()}
         row |= {
             "in part": sum(0 < comment.share < 1 for comment in comments),
             "follows": sum(bool(comment.follows) for comment in comments),
         }
-        rows.append(row | {"mistakes": "; ".join(f"{count}: {mistake}" for mistake, count in mistakes)})
+        rows.append(
+            row | {"mistakes": "; ".join(f"{count}: {mistake}" for mistake, count in mistakes)}
+        )
     return rows
 
 
 def _grades_of(persons: Iterable[Person], question: str) -> Iterator[Grade]:
-    return (grade for person in persons for grade in person.grades.values() if question in grade.marks)
+    return (
+        grade for person in persons for grade in person.grades.values() if question in grade.marks
+    )
 
 
 def _in_words(question: Question, name: str) -> str:
-    """What is said of a known mistake, or of what is known of any result; of others the name tells it."""
-    known = {"follows": "right on top of an earlier wrong answer"} | {code: says for code, says, _ in OF_RESULT}
+    """What is said of a known mistake, or of what is known of any result; of others the name tells
+    it."""
+    known = {"follows": "right on top of an earlier wrong answer"} | {
+        code: says for code, says, _ in OF_RESULT
+    }
     known |= {mistake.name: mistake.says.partition(". ")[0] for mistake in question.mistakes}
     return known.get(name, name.replace("-", " ")).rstrip(".")
 
 
 def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> str:
-    """The page of a student: every question with its mark, points, and what the check says; no solutions."""
+    """The page of a student: every question with its mark, points, and what the check says; no
+    solutions."""
     parts = []
     for letter in letters:
         grade = person.grades.get(letter)
@@ -135,15 +172,37 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
         for question in sets()[letter].questions:
             mark = grade.marks.get(question.name, NOT_RUN) if grade else NOT_RUN
             comment = grade.comments.get(question.name) if grade else None
-            says = (comment or Comment("not run: is there an error in a cell before it?")).says if grade else ""
-            rows.append((question, mark, tidy(worth(grade, question, credit)), WEIGHTS[question.level], says))
-        parts.append((sets()[letter], grade, rows, points([grade] if grade else [], credit), possible([letter])))
+            says = (
+                (comment or Comment("not run: is there an error in a cell before it?")).says
+                if grade
+                else ""
+            )
+            rows.append(
+                (
+                    question,
+                    mark,
+                    tidy(worth(grade, question, credit)),
+                    WEIGHTS[question.level],
+                    says,
+                )
+            )
+        parts.append(
+            (
+                sets()[letter],
+                grade,
+                rows,
+                points([grade] if grade else [], credit),
+                possible([letter]),
+            )
+        )
     came = list(person.grades.values())
     return _page(
         "feedback",
         person=person,
         sets=parts,
-        levels=[(level, points(came, credit, level), possible(letters, level)) for level in WEIGHTS],
+        levels=[
+            (level, points(came, credit, level), possible(letters, level)) for level in WEIGHTS
+        ],
         failed=[(grade.name, grade.note) for grade in person.failed],
         signs=SIGNS,
         points=points(came, credit),
@@ -159,8 +218,11 @@ def overview(
     protection: str,
     credit: Credit = USUAL,
 ) -> str:
-    """The lecturer's page: students with what to look at, who has the same code, questions with their mistakes."""
-    rows = zip(student_rows(persons, letters, credit), (page.as_posix() for page in pages), strict=True)
+    """The lecturer's page: students with what to look at, who has the same code, questions with
+    their mistakes."""
+    rows = zip(
+        student_rows(persons, letters, credit), (page.as_posix() for page in pages), strict=True
+    )
     return _page(
         "overview",
         students=sorted(rows, key=lambda row: (row[0]["group"], row[0]["name"])),

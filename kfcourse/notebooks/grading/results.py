@@ -1,4 +1,5 @@
-"""Grades: one JSON line a notebook, written as soon as it is graded; from the lines a table for spreadsheets is made."""
+"""Grades: one JSON line a notebook, written as soon as it is graded; from the lines a table for
+spreadsheets is made."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.texts import write_csv
 
-NOT_RUN, NOT_GRADED = "not run", "not graded"  # of an answer: an error before it; the grader could not compare it
+# of an answer: an error before it; the grader could not compare it
+NOT_RUN, NOT_GRADED = "not run", "not graded"
 GRADED, PARTLY, OTHER, FAILED = "graded", "graded in part", "not an exercise notebook", "not graded"
 SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–", NOT_GRADED: "?"}
 
@@ -101,14 +103,18 @@ def read_lines(path: Path) -> dict[str, Grade]:
         for text in path.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, TypeError, LookupError, AttributeError):
                 fields = json.loads(text)
-                fields["comments"] = {name: Comment(**_tuples(parts)) for name, parts in fields["comments"].items()}
+                fields["comments"] = {
+                    name: Comment(**_tuples(parts)) for name, parts in fields["comments"].items()
+                }
                 if fields["digest"]:
                     grades[fields["digest"]] = Grade(**_tuples(fields))
     return grades
 
 
 def _tuples(fields: Mapping) -> dict:
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
+    return {
+        name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
+    }
 
 
 def write_lines(grades: Iterable[Grade], path: Path) -> None:
@@ -119,12 +125,27 @@ def write_lines(grades: Iterable[Grade], path: Path) -> None:
 def write_table(grades: Iterable[Grade], path: Path) -> None:
     """Write a row for each grade as CSV that spreadsheets open, completely or not at all."""
     questions = [f"q{i + 1}" for i in range(max(len(one.questions) for one in sets().values()))]
-    columns = ["notebook", "status", "set", "variant", *questions, "passed", "of", "note", "student"]
+    columns = [
+        "notebook",
+        "status",
+        "set",
+        "variant",
+        *questions,
+        "passed",
+        "of",
+        "note",
+        "student",
+    ]
     rows = []
     for grade in sorted(grades, key=lambda grade: grade.name):
         passed, of = (str(grade.passed), str(len(grade.marks))) if grade.marks else ("", "")
         rows.append(
-            {"notebook": grade.name, "status": grade.status, "set": grade.letter, "variant": grade.variant}
+            {
+                "notebook": grade.name,
+                "status": grade.status,
+                "set": grade.letter,
+                "variant": grade.variant,
+            }
             | dict(zip(questions, grade.marks.values(), strict=False))
             | {"passed": passed, "of": of, "note": grade.note, "student": grade.student}
         )

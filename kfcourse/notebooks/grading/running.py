@@ -1,4 +1,5 @@
-"""Running a notebook's cells and calling its functions, in a process of its own with limits of time and memory."""
+"""Running a notebook's cells and calling its functions, in a process of its own with limits of time
+and memory."""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ class Killed(Stopped):
 
 
 class Opening(NamedTuple):
-    """The exercise as the notebook opens it: its letter, the variant as code, personal numbers by "letter variant"."""
+    """The exercise as the notebook opens it: its letter, the variant as code, personal numbers by
+    "letter variant"."""
 
     letter: str
     variant: str
@@ -55,7 +57,8 @@ class Opening(NamedTuple):
 class Ran(NamedTuple):
     """What came of a cell.
 
-    error : its error in words, if any;  stub : whether it is that of an answer that nobody has written;
+    error : its error in words, if any;  stub : whether it is that of an answer that nobody has
+    written;
     answers : question to the type of what was handed in, "" for a function.
     """
 
@@ -85,7 +88,8 @@ class Kernel:
     def __init__(self, place: Site, opening: Opening, seconds: float = SECONDS):
         self._place, self._opening, self.seconds = place, opening, seconds
         self._deadline = float("inf")
-        self._done: list[dict[str, Any]] = []  # cells: an answer that is stopped with its process lets the others be asked
+        # cells: an answer that is stopped with its process lets the others be asked
+        self._done: list[dict[str, Any]] = []
         self._process: subprocess.Popen | None = None
 
     def __enter__(self) -> Kernel:
@@ -106,7 +110,9 @@ class Kernel:
         self._channel = PatientChannel(self._process.stdout, self._process.stdin)
         letter, variant, numbers = self._opening
         try:
-            self._request({"do": "open", "letter": letter, "opening": variant, "numbers": numbers}, START)
+            self._request(
+                {"do": "open", "letter": letter, "opening": variant, "numbers": numbers}, START
+            )
         except (Stopped, OutOfTime):
             raise RuntimeError("the process of the notebook does not start") from None
         for message in self._done:
@@ -138,7 +144,11 @@ class Kernel:
             ) from None
         self._done.append(message)
         answers = reply.get("answers")
-        types = {str(name): str(kind or "") for name, kind in answers.items()} if isinstance(answers, dict) else {}
+        types = (
+            {str(name): str(kind or "") for name, kind in answers.items()}
+            if isinstance(answers, dict)
+            else {}
+        )
         return Ran(clean(str(reply.get("error") or "")), bool(reply.get("stub")), types)
 
     def ask(self, question: str, arguments: tuple, seconds: float) -> Any:
@@ -147,7 +157,8 @@ class Kernel:
         Raises
         ------
         Missing, Unusable, OutOfTime
-            As an answer that is called here would make `kfcourse.checks.engine.call` say; the last with the seconds.
+            As an answer that is called here would make `kfcourse.checks.engine.call` say; the last
+            with the seconds.
         Killed
         """
         functions: list[Callable] = []
@@ -156,7 +167,12 @@ class Kernel:
             functions.append(function)
             return len(functions) - 1
 
-        message = {"do": "ask", "question": question, "arguments": encode(arguments, number), "seconds": seconds}
+        message = {
+            "do": "ask",
+            "question": question,
+            "arguments": encode(arguments, number),
+            "seconds": seconds,
+        }
         try:
             reply = self._request(message, seconds + GRACE, functions)
             if "value" in reply:
@@ -176,11 +192,14 @@ class Kernel:
             raise OutOfTime(seconds)
         raise Unusable(clean(str(fails), 300))
 
-    def _request(self, message: dict[str, Any], seconds: float, functions: Sequence[Callable] = ()) -> dict[str, Any]:
+    def _request(
+        self, message: dict[str, Any], seconds: float, functions: Sequence[Callable] = ()
+    ) -> dict[str, Any]:
         """What the process replies; functions of ours are called when it asks for it."""
         if self._process is None:
             self._start()
-        number, until = secrets.token_hex(4), time.monotonic() + seconds  # a reply to nothing is no reply
+        # a reply to nothing is no reply
+        number, until = secrets.token_hex(4), time.monotonic() + seconds
         answered = False
         try:
             self._channel.send(message | {"id": number})
@@ -196,11 +215,14 @@ class Kernel:
         except Closed:
             if self._process is not None and sandbox.was_killed(self._process):
                 raise Killed(KILLED) from None
-            raise Stopped("its process ended (ended by the notebook itself, or out of memory)") from None
+            raise Stopped(
+                "its process ended (ended by the notebook itself, or out of memory)"
+            ) from None
         except ValueError as error:
             raise Stopped(f"sends what is no answer: {clean(str(error))}") from None
         finally:
-            if not answered:  # also where a limit of time around this one ended: it may be at work still
+            # also where a limit of time around this one ended: it may be at work still
+            if not answered:
                 self.close()
 
 
@@ -209,7 +231,11 @@ def _called(reply: Mapping[str, Any], functions: Sequence[Callable]) -> dict[str
     try:
         values, named = decode(reply.get("values")), reply.get("named") or {}
         number = reply["call"]
-        if type(number) is not int or not 0 <= number < len(functions) or not isinstance(values, tuple):
+        if (
+            type(number) is not int
+            or not 0 <= number < len(functions)
+            or not isinstance(values, tuple)
+        ):
             raise ProtocolError("a call of nothing")
         given = {str(name): decode(value) for name, value in named.items()}
         return {"value": encode(functions[number](*values, **given))}
@@ -239,7 +265,8 @@ class Answer:
 
 
 KEPT = re.compile(
-    r"PATH|LANG|LC_\w+|TZ|VIRTUAL_ENV|CONDA_PREFIX|\w*LD_LIBRARY_PATH|SYSTEMROOT|WINDIR|COMSPEC|PATHEXT", re.IGNORECASE
+    r"PATH|LANG|LC_\w+|TZ|VIRTUAL_ENV|CONDA_PREFIX|\w*LD_LIBRARY_PATH|SYSTEMROOT|WINDIR|COMSPEC|PATHEXT",
+    re.IGNORECASE,
 )
 
 

@@ -18,8 +18,10 @@ import psutil  # type: ignore[import-untyped]
 
 KINDS = ("bwrap", "none")
 PROTECTION = {
-    "bwrap": "bubblewrap: no network, no files but the package's and an empty folder, nothing left running",
-    "none": "NONE: each notebook could read the right answers, change your files and the other notebooks, and use your network",
+    "bwrap": "bubblewrap: no network, no files but the package's and an empty folder, nothing "
+    "left running",
+    "none": "NONE: each notebook could read the right answers, change your files and the other "
+    "notebooks, and use your network",
 }
 SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/opt")
 ETC = ("/etc/ld.so.cache", "/etc/fonts", "/etc/alternatives", "/etc/localtime", "/etc/mime.types")
@@ -33,14 +35,18 @@ class Sandbox:
     ----------
     kind : {"bwrap", "none"}
     hidden : tuple of str
-        Folders that no notebook may see in the sandbox: the package with the answers, the returned notebooks.
+        Folders that no notebook may see in the sandbox: the package with the answers, the returned
+        notebooks.
     """
 
     kind: str
     hidden: tuple[str, ...] = ()
 
-    def start(self, command: Sequence[str], folder: Path, stage: Path, environment: Mapping[str, str]) -> subprocess.Popen:
-        """Start a command in `folder`, where it may write; it reads the package in `stage` and Python's libraries."""
+    def start(
+        self, command: Sequence[str], folder: Path, stage: Path, environment: Mapping[str, str]
+    ) -> subprocess.Popen:
+        """Start a command in `folder`, where it may write; it reads the package in `stage` and
+        Python's libraries."""
         return subprocess.Popen(
             [*(self.bubblewrap(folder, stage) if self.kind == "bwrap" else ()), *command],
             stdin=subprocess.PIPE,
@@ -70,9 +76,12 @@ class Sandbox:
                 options += ["--ro-bind-try", place, place]
         seen = [os.path.realpath(place) for place in (*SYSTEM, *libraries)]
         for place in self.hidden:
-            if os.path.isdir(place) and any(Path(place).resolve().is_relative_to(known) for known in seen):
+            if os.path.isdir(place) and any(
+                Path(place).resolve().is_relative_to(known) for known in seen
+            ):
                 options += ["--tmpfs", place]
-        options += ["--ro-bind", str(stage), str(stage)]  # the package as notebooks see it, whatever was hidden
+        # the package as notebooks see it, whatever was hidden
+        options += ["--ro-bind", str(stage), str(stage)]
         return [*options, "--bind", str(folder), str(folder), "--chdir", str(folder)]
 
 
@@ -108,7 +117,13 @@ def problem(folder: Path, stage: Path) -> str:
     """Why bubblewrap does not work here; nothing if it does."""
     if not shutil.which("bwrap"):
         return "bubblewrap is not installed (Debian, Ubuntu: apt install bubblewrap)"
-    command = [*Sandbox("bwrap").bubblewrap(folder, stage), sys.executable, "-I", "-c", "import numpy"]
+    command = [
+        *Sandbox("bwrap").bubblewrap(folder, stage),
+        sys.executable,
+        "-I",
+        "-c",
+        "import numpy",
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     words = (done.stderr.strip().splitlines() or ["no message"])[-1][:200]
     return f"bubblewrap does not work here: {words}" if done.returncode else ""

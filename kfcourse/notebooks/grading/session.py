@@ -1,7 +1,9 @@
-"""In the process of a notebook that is graded: runs its cells and calls its functions, and knows no answers.
+"""In the process of a notebook that is graded: runs its cells and calls its functions, and knows no
+answers.
 
-Only values leave it.  What it is asked, and what becomes of the values, is decided by the grader, which no line of the notebook
-enters; a notebook that changes this module can return other values, as it can by other functions, and nothing else.
+Only values leave it.  What it is asked, and what becomes of the values, is decided by the grader,
+which no line of the notebook enters; a notebook that changes this module can return other values,
+as it can by other functions, and nothing else.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from kfcourse.notebooks.grading.values import decode, encode
 
 
 class Task:
-    """An exercise in a check cell: takes what is handed in, whatever the notebook has made of its class."""
+    """An exercise in a check cell: takes what is handed in, whatever the notebook has made of its
+    class."""
 
     def __init__(self, task: Exercise, answers: dict[str, Any]):
         self._task, self._answers = task, answers
@@ -42,7 +45,8 @@ class Task:
 
 
 class Shell(InteractiveShell):
-    """IPython without a screen: nobody reads tracebacks, and what concerns the display alone stops no cell."""
+    """IPython without a screen: nobody reads tracebacks, and what concerns the display alone stops
+    no cell."""
 
     def showtraceback(self, *_: Any, **__: Any) -> None:
         """Nothing."""
@@ -67,17 +71,22 @@ class Session:
         builtins.input = _nobody_answers
         Exercise.check = _not_checked  # type: ignore[method-assign]
 
-    def open(self, letter: str, opening: str, numbers: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
-        """Open the exercise as it was handed out; `numbers`: personal numbers by "letter variant"."""
+    def open(
+        self, letter: str, opening: str, numbers: Mapping[str, Mapping[str, float]]
+    ) -> dict[str, Any]:
+        """Open the exercise as it was handed out; `numbers`: personal numbers by "letter
+        variant"."""
         kfcourse.exercises.NUMBERS.update(numbers)
         self._opened = letter, ast.literal_eval(opening)
         exercise(*self._opened)
         return {}
 
     def cell(self, source: str, names: Sequence[str] = ()) -> dict[str, Any]:
-        """Run a cell: the error it ends with, if any, whether a stub raised it, and the types of what it hands in.
+        """Run a cell: the error it ends with, if any, whether a stub raised it, and the types of
+        what it hands in.
 
-        `names` are those by which a check cell calls the exercise; they get it as it was handed out.
+        `names` are those by which a check cell calls the exercise; they get it as it was handed
+        out.
         """
         handed_in: dict[str, Any] = {}
         if names:
@@ -87,7 +96,10 @@ class Session:
             sys.modules["matplotlib.pyplot"].close("all")
         error = done.error_before_exec or done.error_in_exec
         self._answers |= handed_in  # earlier ones stay: later steps may stand on them
-        answers = {str(name): None if callable(value) else type(value).__name__ for name, value in handed_in.items()}
+        answers = {
+            str(name): None if callable(value) else type(value).__name__
+            for name, value in handed_in.items()
+        }
         return {"error": error and _text(error), "stub": _of_a_stub(error), "answers": answers}
 
     def ask(self, question: str, arguments: Any, seconds: float) -> dict[str, Any]:
@@ -100,7 +112,9 @@ class Session:
         except Closed:
             raise
         except RecursionError:
-            return {"fails": "calls itself without end, or nests a formula without end (RecursionError)"}
+            return {
+                "fails": "calls itself without end, or nests a formula without end (RecursionError)"
+            }
         except BaseException as error:
             return {"fails": "missing" if _of_a_stub(error) else f"stops with {told(error)}"}
 
@@ -140,12 +154,17 @@ def _text(error: BaseException) -> str:
 
 
 def main() -> None:
-    """The process: messages come and go where standard input and output were, which are closed to the notebook."""
+    """The process: messages come and go where standard input and output were, which are closed to
+    the notebook."""
     channel = Channel(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nowhere, stream)
-    sys.meta_path[:] = [finder for finder in sys.meta_path if "__editable__" not in getattr(finder, "__module__", "")]
+    sys.meta_path[:] = [
+        finder
+        for finder in sys.meta_path
+        if "__editable__" not in getattr(finder, "__module__", "")
+    ]
     session = Session(channel)
     limit_process(int(sys.argv[1]))
     work: dict[str, Any] = {"open": session.open, "cell": session.cell, "ask": session.ask}

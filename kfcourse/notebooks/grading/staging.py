@@ -1,4 +1,5 @@
-"""The package as a returned notebook sees it: a copy without the right answers, and personal numbers in their place."""
+"""The package as a returned notebook sees it: a copy without the right answers, and personal
+numbers in their place."""
 
 from __future__ import annotations
 
@@ -20,7 +21,10 @@ LEFT_OUT = (
     "listing.py",
     "__main__.py",
 )  # what a student's notebook has no use for
-NEEDED = ("__init__.py", *(f"grading/{name}.py" for name in ("__init__", "channel", "session", "values")))
+NEEDED = (
+    "__init__.py",
+    *(f"grading/{name}.py" for name in ("__init__", "channel", "session", "values")),
+)
 ANSWERS = "derivations/worked.py"  # writes right derivations
 FONTS = "fonts"  # on the stage: those that matplotlib has found
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
@@ -38,17 +42,23 @@ def _numbers(task):
     try:
         return dict(NUMBERS[f"{task.letter} {task.variant.name}"])
     except KeyError:
-        raise ValueError(f"personal numbers of set {task.letter}, variant {task.variant.name} are not yours") from None
+        name = f"set {task.letter}, variant {task.variant.name}"
+        raise ValueError(f"personal numbers of {name} are not yours") from None
 
 
 for _letter, _title, _name, _about, _angles in {rows!r}:
     _folder = Path(__file__).parent / _name
-    register(ExerciseSet(_letter, _title, _folder, (), numbers=_numbers, about_variant=_about, angles=_angles))
+    register(
+        ExerciseSet(
+            _letter, _title, _folder, (), numbers=_numbers, about_variant=_about, angles=_angles
+        )
+    )
 '''
 
 
 def stage(folder: Path) -> Path:
-    """Write the package into a folder for graded notebooks: a copy without keys, questions, mistakes and masters.
+    """Write the package into a folder for graded notebooks: a copy without keys, questions,
+    mistakes and masters.
 
     Only that copy is on the path where a returned notebook runs.
 
@@ -74,11 +84,17 @@ def stage(folder: Path) -> Path:
         if (one.folder / COMPANIONS).exists():
             (target / "exercises" / one.folder.name).mkdir()
             shutil.copy2(one.folder / COMPANIONS, target / "exercises" / one.folder.name)
-    rows = [(one.letter, one.title, one.folder.name, one.about_variant, one.angles) for one in registered]
-    (target / "exercises" / "__init__.py").write_text(REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8")
+    rows = [
+        (one.letter, one.title, one.folder.name, one.about_variant, one.angles)
+        for one in registered
+    ]
+    (target / "exercises" / "__init__.py").write_text(
+        REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8"
+    )
     compileall.compile_dir(target, quiet=2)
     (folder / FONTS).mkdir()
-    for path in _cache_of_matplotlib().glob("fontlist*.json"):  # otherwise each process searches for fonts again
+    # otherwise each process searches for fonts again
+    for path in _cache_of_matplotlib().glob("fontlist*.json"):
         shutil.copy(path, folder / FONTS)
     return folder
 
@@ -91,11 +107,15 @@ def _cache_of_matplotlib() -> Path:
 
 def answers() -> list[Path]:
     """Folders that hold the right answers: no notebook may read them."""
-    return sorted({one.folder.parent for one in sets().values()} | {Path(str(resources.files("kfcourse.exercises")))})
+    return sorted(
+        {one.folder.parent for one in sets().values()}
+        | {Path(str(resources.files("kfcourse.exercises")))}
+    )
 
 
 def personal_numbers(own: Exercise, others: Iterable[Exercise] = ()) -> dict[str, dict[str, float]]:
-    """Personal numbers of an exercise, and of the others that a notebook opens so far as they have any, by "letter variant"."""
+    """Personal numbers of an exercise, and of the others that a notebook opens so far as they have
+    any, by "letter variant"."""
     numbers = {_key(own): own.numbers}
     for other in others:
         with suppress(Exception):  # of tables of the student's

@@ -1,4 +1,5 @@
-"""What was returned: the notebooks of a folder, their cells, and the exercise that each claims to be."""
+"""What was returned: the notebooks of a folder, their cells, and the exercise that each claims to
+be."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ LINK = "a link, which is not followed: ask for the notebook itself"
 ARCHIVE = "an archive: unpack it, or take it away, and grade again"
 EXPORT = "no notebook, but perhaps made from one: ask for the .ipynb itself, or take it away"
 RENAMED = "a notebook by another name: end its name in .ipynb, and grade again"
-NOT_READ = dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".tgz", ".tbz2", ".txz", ".gz", ".bz2", ".xz", ".zst"), ARCHIVE)
+NOT_READ = dict.fromkeys(
+    (".zip", ".7z", ".rar", ".tar", ".tgz", ".tbz2", ".txz", ".gz", ".bz2", ".xz", ".zst"), ARCHIVE
+)
 NOT_READ |= dict.fromkeys((".html", ".htm", ".py", ".json"), EXPORT)
 
 
@@ -72,14 +75,18 @@ def returned(
     masters: Path | None = None,
     given: Callable[[str, Path], str] = lambda name, path: "",
 ) -> list[Returned]:
-    """The notebooks in a folder and the folders in it, and what may be one and cannot be read: links, archives, exports.
+    """The notebooks in a folder and the folders in it, and what may be one and cannot be read:
+    links, archives, exports.
 
     `given` says which variant the student of a notebook was given, from its name and path.
     """
     folder, masters = folder.absolute(), masters and masters.absolute()
     variants_file = variants_file and variants_file.absolute()
     setting = hashlib.sha256(f"{package_digest()}{seconds}".encode())
-    for path in (*sorted(masters.glob("*/statement.md") if masters else []), *filter(None, [variants_file])):
+    for path in (
+        *sorted(masters.glob("*/statement.md") if masters else []),
+        *filter(None, [variants_file]),
+    ):
         setting.update(path.read_bytes())
     works = []
     for path, problem in sorted(_handed_in(folder)):
@@ -95,7 +102,8 @@ def returned(
 
 
 def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
-    """Files and folders in which a student may have handed in something, each with why it is not read, if it is not."""
+    """Files and folders in which a student may have handed in something, each with why it is not
+    read, if it is not."""
     unread: list[OSError] = []
     for at, folders, files in os.walk(folder, onerror=unread.append):
         for name in folders:
@@ -103,7 +111,9 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
                 yield path, LINK
         for path in (Path(at, name) for name in files):
             kind = path.suffix.lower()
-            notebook = path.with_name(path.name[: len(path.name) - len(kind)].removesuffix(".ipynb") + ".ipynb")
+            notebook = path.with_name(
+                path.name[: len(path.name) - len(kind)].removesuffix(".ipynb") + ".ipynb"
+            )
             if kind == ".ipynb":
                 if not _is_copy(path):
                     yield path, _unread(path, path.relative_to(folder))
@@ -117,7 +127,8 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _is_copy(path: Path) -> bool:
-    """Whether a program has made it beside a notebook that is there: Jupyter its checkpoints, a Mac its `._` files."""
+    """Whether a program has made it beside a notebook that is there: Jupyter its checkpoints, a Mac
+    its `._` files."""
     if path.parent.name == ".ipynb_checkpoints":
         return (path.parent.parent / f"{path.stem.removesuffix('-checkpoint')}.ipynb").exists()
     at = Path(*(part for part in path.parent.parts if part != "__MACOSX"))
@@ -145,8 +156,8 @@ def _content(path: Path) -> bytes:
 class Cell(NamedTuple):
     """A cell of a returned notebook.
 
-    number: its place among all cells, from 1;  answer: name of the function that the master asked for here, if still known;
-    code: whether it is one.
+    number: its place among all cells, from 1;  answer: name of the function that the master asked
+    for here, if still known; code: whether it is one.
     """
 
     number: int
@@ -167,7 +178,9 @@ def read_document(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise Unreadable(error.strerror or str(error)) from None
     except (ValueError, RecursionError):
-        raise Unreadable("not a notebook: the file is not JSON; was it cut off, or saved as something else?") from None
+        raise Unreadable(
+            "not a notebook: the file is not JSON; was it cut off, or saved as something else?"
+        ) from None
     if not isinstance(document, dict) or not isinstance(document.get("metadata", {}), dict):
         raise Unreadable("not a notebook: JSON of something else")
     return document
@@ -177,7 +190,9 @@ def cells_of(document: Mapping[str, Any]) -> list[Cell]:
     """Cells that are not empty; what is malformed is left out."""
     cells = document.get("cells")
     if not isinstance(cells, list):
-        raise Unreadable("a notebook without cells, or of an old format: open it in Jupyter and save it again")
+        raise Unreadable(
+            "a notebook without cells, or of an old format: open it in Jupyter and save it again"
+        )
     read = []
     for number, cell in enumerate(cells, 1):
         if not isinstance(cell, dict):
@@ -188,27 +203,48 @@ def cells_of(document: Mapping[str, Any]) -> list[Cell]:
         answer = mark.get("answer") if isinstance(mark, dict) else None
         answer = answer if isinstance(answer, str) else ""
         if source.strip():
-            read.append(Cell(number, str(cell.get("id", "")), answer, source, cell.get("cell_type") == "code"))
+            read.append(
+                Cell(
+                    number, str(cell.get("id", "")), answer, source, cell.get("cell_type") == "code"
+                )
+            )
     return read
 
 
-def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given: str = "") -> tuple[Exercise, list[str]]:
-    """The set that a notebook claims, for the variant that was given, and what to look at about that.
+def claimed(
+    claim: Any, cells: Sequence[Cell], variants_file: Path | None, given: str = ""
+) -> tuple[Exercise, list[str]]:
+    """The set that a notebook claims, for the variant that was given, and what to look at about
+    that.
 
-    Without a course list the notebook has only a name of a variant to give; a table in it counts for nothing.
+    Without a course list the notebook has only a name of a variant to give; a table in it counts
+    for nothing.
     """
-    letter, name = (str(claim.get(key)) if isinstance(claim, dict) else "" for key in ("set", "variant"))
+    letter, name = (
+        str(claim.get(key)) if isinstance(claim, dict) else "" for key in ("set", "variant")
+    )
     if letter not in sets():
-        raise Unreadable(f"claims set {letter!r}, variant {name!r}; the sets are {', '.join(sets())}")
+        raise Unreadable(
+            f"claims set {letter!r}, variant {name!r}; the sets are {', '.join(sets())}"
+        )
     try:
         variant = find_variant(given or name, variants_file)
     except VariantError as error:
-        hint = "" if variants_file else f"if variant {given or name} is of a file of yours, name that with --variants; "
-        raise Unreadable(f"{hint}{error}") from None  # the advice first: the list may be long, and is cut in the table
+        hint = (
+            ""
+            if variants_file
+            else f"if variant {given or name} is of a file of yours, name that with --variants; "
+        )
+        # the advice first: the list may be long, and is cut in the table
+        raise Unreadable(f"{hint}{error}") from None
     marked = f"marked as variant {variant.name}" + ", which was given" * bool(given)
     looks = [f"for variant {name}, and {marked}"] if given and name != given else []
     for other, what in (call for cell in cells for call in openings(cell.source)):
-        table = {key: value for key, value in what.items() if key != "name"} if isinstance(what, dict) else None
+        table = (
+            {key: value for key, value in what.items() if key != "name"}
+            if isinstance(what, dict)
+            else None
+        )
         other_name = what.get("name") if isinstance(what, dict) else what
         if (other, other_name) not in ((letter, variant.name), (letter, name)):
             looks.append(f"opens set {other}, variant {other_name}")
@@ -220,7 +256,11 @@ def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given
 def openings(source: str) -> Iterator[tuple[Any, Any]]:
     """Arguments of the calls exercise("a", ...) in a cell, where they are literals."""
     for node in ast.walk(syntax(source) or ast.Module([], [])):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "exercise":
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id == "exercise"
+        ):
             with suppress(ValueError, TypeError):
                 arguments = [ast.literal_eval(argument) for argument in node.args]
                 named = {keyword.arg: ast.literal_eval(keyword.value) for keyword in node.keywords}

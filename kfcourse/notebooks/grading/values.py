@@ -1,7 +1,10 @@
-"""Values between a notebook's process and the grader: plain JSON, and nothing is executed when it is read.
+"""Values between a notebook's process and the grader: plain JSON, and nothing is executed when it
+is read.
 
-A value is None, a truth value, a number, a text, a list or tuple, an array of numbers, or a SymPy formula or matrix of
-formulas.  A formula travels as the text that `sympy.srepr` writes, and is read by Python's parser and a list of SymPy's own
+A value is None, a truth value, a number, a text, a list or tuple, an array of numbers, or a SymPy
+formula or matrix of
+formulas.  A formula travels as the text that `sympy.srepr` writes, and is read by Python's parser
+and a list of SymPy's own
 functions.  Anything else arrives as an empty object that has the name of its type.
 """
 
@@ -30,10 +33,13 @@ _COMPOSED = (
 HEADS: dict[str, type] = {kind.__name__: kind for kind in _COMPOSED} | {
     name: kind
     for name, kind in vars(sp.functions).items()
-    if isinstance(kind, type) and issubclass(kind, Application) and kind not in (sp.Function, sp.WildFunction)
+    if isinstance(kind, type)
+    and issubclass(kind, Application)
+    and kind not in (sp.Function, sp.WildFunction)
 }
 CONSTANTS: dict[str, sp.Basic] = {
-    name: getattr(sp, name) for name in ("pi", "E", "I", "oo", "zoo", "nan", "true", "false", "EulerGamma", "GoldenRatio")
+    name: getattr(sp, name)
+    for name in ("pi", "E", "I", "oo", "zoo", "nan", "true", "false", "EulerGamma", "GoldenRatio")
 }
 
 
@@ -65,7 +71,10 @@ def encode(value: Any, functions: Functions | None = None) -> Any:
     if type(value) is complex:
         return ["complex", value.real, value.imag]
     if isinstance(value, list | tuple):
-        return ["list" if isinstance(value, list) else "tuple", [encode(part, functions) for part in value]]
+        return [
+            "list" if isinstance(value, list) else "tuple",
+            [encode(part, functions) for part in value],
+        ]
     if isinstance(value, sp.MatrixExpr):
         value = value.as_explicit()
     if isinstance(value, sp.MatrixBase):
@@ -88,10 +97,20 @@ def _text(formula: sp.Expr) -> str:
 def _array(value: Any, functions: Functions | None) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "O":
-        return ["objects", list(array.shape), [encode(entry, functions) for entry in array.ravel().tolist()]]
+        return [
+            "objects",
+            list(array.shape),
+            [encode(entry, functions) for entry in array.ravel().tolist()],
+        ]
     if array.dtype.kind not in "biufc":
         return ["other", f"array of {array.dtype.name}"]
-    kind = "scalar" if isinstance(value, np.generic) else "matrix" if isinstance(value, np.matrix) else "array"
+    kind = (
+        "scalar"
+        if isinstance(value, np.generic)
+        else "matrix"
+        if isinstance(value, np.matrix)
+        else "array"
+    )
     data = io.BytesIO()
     np.save(data, array, allow_pickle=False)
     return [kind, base64.b64encode(data.getvalue()).decode()]
@@ -131,7 +150,9 @@ def _decoded(data: Any, proxies: Proxies | None) -> Any:
             if array.dtype.kind not in "biufc":
                 raise ProtocolError(f"an array of {array.dtype}")
             array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
-            return array[()] if kind == "scalar" else np.asmatrix(array) if kind == "matrix" else array
+            return (
+                array[()] if kind == "scalar" else np.asmatrix(array) if kind == "matrix" else array
+            )
         case ["objects", list(shape), list(parts)]:
             array = np.empty(len(parts), dtype=object)
             for place, part in enumerate(parts):
@@ -149,7 +170,8 @@ def _decoded(data: Any, proxies: Proxies | None) -> Any:
 
 
 def formula(text: str) -> sp.Basic:
-    """The formula of a text of `sympy.srepr`; ProtocolError if it has anything but SymPy's own functions."""
+    """The formula of a text of `sympy.srepr`; ProtocolError if it has anything but SymPy's own
+    functions."""
     if len(text) > LONGEST:
         raise ProtocolError(f"a formula of {len(text)} characters")
     return _read(ast.parse(text, mode="eval").body)
@@ -161,11 +183,17 @@ def _read(node: ast.AST) -> sp.Basic:
             return CONSTANTS[name]
         case ast.UnaryOp(op=ast.USub(), operand=ast.Name(id="oo")):
             return -sp.oo
-        case ast.Call(func=ast.Name(id="Symbol"), args=[ast.Constant(value=str(name))], keywords=given):
-            return sp.Symbol(name, **{str(one.arg): bool(ast.literal_eval(one.value)) for one in given})
+        case ast.Call(
+            func=ast.Name(id="Symbol"), args=[ast.Constant(value=str(name))], keywords=given
+        ):
+            return sp.Symbol(
+                name, **{str(one.arg): bool(ast.literal_eval(one.value)) for one in given}
+            )
         case ast.Call(func=ast.Name(id="Integer" | "Rational"), args=parts, keywords=[]):
             return sp.Rational(*(int(ast.literal_eval(part)) for part in parts))
-        case ast.Call(func=ast.Name(id="Float"), args=[ast.Constant(value=str(digits))], keywords=[precision]):
+        case ast.Call(
+            func=ast.Name(id="Float"), args=[ast.Constant(value=str(digits))], keywords=[precision]
+        ):
             return sp.Float(digits, precision=min(int(ast.literal_eval(precision.value)), 10_000))
         case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]) if name in HEADS:
             return HEADS[name](*map(_read, parts))

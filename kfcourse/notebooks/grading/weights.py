@@ -9,7 +9,8 @@ from kfcourse.checks import Question, sets
 from kfcourse.checks.question import PASSED, WRONG
 from kfcourse.notebooks.grading.results import Grade
 
-WEIGHTS = {"warm-up": 1, "core": 2, "stretch": 3}  # points of a right answer, by the question's level
+# points of a right answer, by the question's level
+WEIGHTS = {"warm-up": 1, "core": 2, "stretch": 3}
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,19 @@ def worth(grade: Grade | None, question: Question, credit: Credit) -> float:
 
 def points(grades: Iterable[Grade], credit: Credit, level: str | None = None) -> float:
     """Points of all answers, those of one level or of all; whole ones without decimals."""
-    asked = [(grade, question) for grade in grades if grade.letter in sets() for question in sets()[grade.letter].questions]
-    return tidy(sum(worth(grade, question, credit) for grade, question in asked if level in (None, question.level)))
+    asked = [
+        (grade, question)
+        for grade in grades
+        if grade.letter in sets()
+        for question in sets()[grade.letter].questions
+    ]
+    return tidy(
+        sum(
+            worth(grade, question, credit)
+            for grade, question in asked
+            if level in (None, question.level)
+        )
+    )
 
 
 def tidy(number: float) -> float:
@@ -62,4 +74,6 @@ def tidy(number: float) -> float:
 
 def possible(letters: Iterable[str], level: str | None = None) -> int:
     """Points that there are in some sets."""
-    return sum(WEIGHTS[one.level] for one in questions(letters).values() if level in (None, one.level))
+    return sum(
+        WEIGHTS[one.level] for one in questions(letters).values() if level in (None, one.level)
+    )

@@ -1,10 +1,13 @@
-"""Integrated navigation: several sensors, each with its own meter, rate, delay and time scale, and one filter.
+"""Integrated navigation: several sensors, each with its own meter, rate, delay and time scale, and
+one filter.
 
     dx = (A x + B u) dt + dW,     y = b(x(t_j), w_j)   at the moments t_j of the sensor's own
 
 Dynamics, Inputs, Path    the motion, and its exact transition over any interval
-Sensor, Clock, observe    what the sensors say of it: a list of `Observation`, in the order of arrival
-fuse                      the filter: each measurement is used at its moment of capture, however late it comes
+Sensor, Clock, observe    what the sensors say of it: a list of `Observation`, in the order of
+arrival
+fuse                      the filter: each measurement is used at its moment of capture, however
+late it comes
 follow                    the same, with its innovations
 
 Chapters "Integration of sensors" and "Rates and time tags" of the book; lecture 12.

@@ -25,19 +25,25 @@ from kfcourse.errors import expect_not_negative, expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
 
-ROUNDING = 1e-9  # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to 1e-11 s
-LAST_PLACES = 4  # units in the last place by which a moment that is computed in two ways differs: tag to time, sums of intervals
+# s (or periods): moments that differ by less are the same but for rounding; float64 holds days to
+# 1e-11 s
+ROUNDING = 1e-9
+# units in the last place by which a moment that is computed in two ways differs: tag to time, sums
+# of intervals
+LAST_PLACES = 4
 TRANSITIONS = 4096  # intervals remembered: sensors of fixed rates need a few, random delays many
 
 
 def rounding(*moments: ArrayLike) -> float:
-    """By how much moments may differ that are the same but for rounding: more at stamps of Unix, which hold 2e-7 s."""
+    """By how much moments may differ that are the same but for rounding: more at stamps of Unix,
+    which hold 2e-7 s."""
     largest = max(float(np.max(np.abs(moment), initial=0.0)) for moment in moments)
     return max(ROUNDING, LAST_PLACES * float(np.spacing(largest)))
 
 
 class Transition(NamedTuple):
-    """x' = A x + B u + v, v ~ N(0, Q): Phi (n, n), Gamma (n, m), Q (n, n), named as in `kfcourse.linear.runs.LinearSystem`."""
+    """x' = A x + B u + v, v ~ N(0, Q): Phi (n, n), Gamma (n, m), Q (n, n), named as in
+    `kfcourse.linear.runs.LinearSystem`."""
 
     A: Array
     B: Array
@@ -53,7 +59,8 @@ class Dynamics:
     A : ndarray (n, n)
         In 1/s.
     Qc : ndarray (n, n)
-        Intensity of the white noise, M[w(t) w(s)^T] = Qc delta(t - s): its two-sided spectral density, in (units of x)^2 / s.
+        Intensity of the white noise, M[w(t) w(s)^T] = Qc delta(t - s): its two-sided spectral
+        density, in (units of x)^2 / s.
     B : ndarray (n, m), optional
         Effect of the known input.
 
@@ -76,14 +83,19 @@ class Dynamics:
         if Qc.shape != (n, n):
             raise ValueError(f"Qc has the shape {Qc.shape}; with {n} states it is {(n, n)}")
         if B.ndim != 2 or len(B) != n:
-            raise ValueError(f"B has the shape {B.shape}; with {n} states it is ({n}, number of inputs)")
+            raise ValueError(
+                f"B has the shape {B.shape}; with {n} states it is ({n}, number of inputs)"
+            )
         for name, matrix in (("A", A), ("Qc", Qc), ("B", B)):
             if not np.isfinite(matrix).all():
                 raise ValueError(f"{name} must be finite, got {matrix.tolist()}")
             object.__setattr__(self, name, matrix)
         values = np.linalg.eigvalsh(symmetric(Qc))
-        if not np.array_equal(Qc, Qc.T) or values.min() < -1e-12 * max(values.max(), 0.0):  # rounding of eigvalsh
-            raise ValueError(f"Qc is an intensity of noise: symmetric and not negative; got {Qc.tolist()}")
+        # rounding of eigvalsh
+        if not np.array_equal(Qc, Qc.T) or values.min() < -1e-12 * max(values.max(), 0.0):
+            raise ValueError(
+                f"Qc is an intensity of noise: symmetric and not negative; got {Qc.tolist()}"
+            )
 
     @property
     def inputs(self) -> int:
@@ -95,7 +107,9 @@ class Dynamics:
 
         By Van Loan's exponential (1978) for a part h of dt with |A| h <= 1/2,
 
-            exp([[A, Q_c, B], [0, -A^T, 0], [0, 0, 0]] h) = [[Phi, X, Gamma], [0, Phi^-T, 0], [0, 0, I]],   Q = X Phi^T
+            exp([[A, Q_c, B], [0, -A^T, 0], [0, 0, 0]] h)
+                = [[Phi, X, Gamma], [0, Phi^-T, 0], [0, 0, I]],
+            Q = X Phi^T
 
         and then doubled until h is dt, as exp(-A dt) may be huge where exp(A dt) is small:
 
@@ -112,7 +126,9 @@ class Dynamics:
         block = np.zeros((2 * n + self.inputs,) * 2)
         block[:n, :n], block[:n, n : 2 * n], block[:n, 2 * n :] = self.A, self.Qc, self.B
         block[n : 2 * n, n : 2 * n] = -self.A.T
-        Phi, X, Gamma = np.split(scipy.linalg.expm(block * (dt / 2**doublings))[:n], [n, 2 * n], axis=1)
+        Phi, X, Gamma = np.split(
+            scipy.linalg.expm(block * (dt / 2**doublings))[:n], [n, 2 * n], axis=1
+        )
         Q = X @ Phi.T
         for _ in range(doublings):
             Q, Gamma, Phi = Q + Phi @ Q @ Phi.T, Gamma + Phi @ Gamma, Phi @ Phi
@@ -120,7 +136,8 @@ class Dynamics:
 
 
 class Inputs(NamedTuple):
-    """A known input, sampled by a fast sensor: values[i], (runs, m) or (1, m), acts from times[i] until times[i + 1].
+    """A known input, sampled by a fast sensor: values[i], (runs, m) or (1, m), acts from times[i]
+    until times[i + 1].
 
     times (s,) ascending, values (s, runs, m).  The last value acts for ever.
     """
@@ -130,7 +147,8 @@ class Inputs(NamedTuple):
 
 
 class Path(NamedTuple):
-    """True states (s, runs, n) at times (s,): as a function, it looks up the states at some of these times."""
+    """True states (s, runs, n) at times (s,): as a function, it looks up the states at some of
+    these times."""
 
     times: Array
     states: Array
@@ -138,12 +156,16 @@ class Path(NamedTuple):
     def __call__(self, times: Array) -> Array:
         """States (len(times), runs, n); ValueError for a time that is not stored."""
         slack = rounding(self.times, times)
-        index = np.minimum(np.searchsorted(self.times, np.asarray(times) - slack), len(self.times) - 1)
+        index = np.minimum(
+            np.searchsorted(self.times, np.asarray(times) - slack), len(self.times) - 1
+        )
         missing = np.flatnonzero(np.abs(self.times[index] - times) > 2 * slack)
         if len(missing):
             raise ValueError(
-                f"the path is not known at t = {np.asarray(times)[missing[0]]:.16g} s; sample it at all moments that are needed: "
-                "np.unique(np.concatenate([outputs, *(sensor.captures(duration) for sensor in sensors)]))"
+                f"the path is not known at t = {np.asarray(times)[missing[0]]:.16g} s; sample it "
+                f"at all moments that are needed: "
+                "np.unique(np.concatenate([outputs, *(sensor.captures(duration) for sensor in "
+                "sensors)]))"
             )
         return self.states[index]
 
@@ -152,8 +174,11 @@ Mover = Callable[[Array, float, float], Array]
 Predictor = Callable[[Gaussian, float, float], Gaussian]
 
 
-def motion(dynamics: Dynamics, inputs: Inputs | None = None) -> tuple[Callable[[float], Transition], Mover]:
-    """Transitions over intervals, each found once, and the noiseless motion (x (..., n), start, end) -> x.
+def motion(
+    dynamics: Dynamics, inputs: Inputs | None = None
+) -> tuple[Callable[[float], Transition], Mover]:
+    """Transitions over intervals, each found once, and the noiseless motion (x (..., n), start,
+    end) -> x.
 
     Raises
     ------
@@ -163,7 +188,10 @@ def motion(dynamics: Dynamics, inputs: Inputs | None = None) -> tuple[Callable[[
     over = lru_cache(maxsize=TRANSITIONS)(dynamics.over)
     if inputs is None:
         if dynamics.inputs:
-            raise ValueError(f"the dynamics have {dynamics.inputs} known input(s); give them: inputs=Inputs(times, values)")
+            raise ValueError(
+                f"the dynamics have {dynamics.inputs} known input(s); give them: "
+                f"inputs=Inputs(times, values)"
+            )
         return over, lambda x, start, end: apply(over(end - start).A, x)
     times, values = np.asarray(inputs.times, dtype=float), np.asarray(inputs.values, dtype=float)
     _check_inputs(dynamics, times, values)
@@ -171,7 +199,9 @@ def motion(dynamics: Dynamics, inputs: Inputs | None = None) -> tuple[Callable[[
     def move(x: Array, start: float, end: float) -> Array:
         first = int(np.searchsorted(times, start, side="right")) - 1
         if first < 0:
-            raise ValueError(f"the inputs begin at t = {times[0]:.16g} s, but are needed from t = {start:.16g} s")
+            raise ValueError(
+                f"the inputs begin at t = {times[0]:.16g} s, but are needed from t = {start:.16g} s"
+            )
         last = int(np.searchsorted(times, end, side="left"))
         edges = [start, *times[first + 1 : last].tolist(), end]
         for i, (left, right) in enumerate(pairwise(edges)):
@@ -183,7 +213,8 @@ def motion(dynamics: Dynamics, inputs: Inputs | None = None) -> tuple[Callable[[
 
 
 def predictor(dynamics: Dynamics, inputs: Inputs | None = None) -> Predictor:
-    """(law, start, end) -> law: the mean moves with the inputs, the covariance needs one step, whatever they are.
+    """(law, start, end) -> law: the mean moves with the inputs, the covariance needs one step,
+    whatever they are.
 
     Phi m + Gamma u + ...,   Phi P Phi^T + Q
     """
@@ -199,16 +230,32 @@ def predictor(dynamics: Dynamics, inputs: Inputs | None = None) -> Predictor:
 
 
 def _check_inputs(dynamics: Dynamics, times: Array, values: Array) -> None:
-    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+    if (
+        times.ndim != 1
+        or not len(times)
+        or not np.isfinite(times).all()
+        or (np.diff(times) <= 0).any()
+    ):
         raise ValueError("the times of the inputs must be finite and ascending, one for each value")
     if values.ndim != 3 or len(values) != len(times) or values.shape[2] != dynamics.inputs:
-        raise ValueError(f"inputs must have the shape ({len(times)}, runs or 1, {dynamics.inputs}), got {values.shape}")
+        raise ValueError(
+            f"inputs must have the shape ({len(times)}, runs or 1, {dynamics.inputs}), got "
+            f"{values.shape}"
+        )
     if not np.isfinite(values).all():
-        raise ValueError("inputs must be finite: fill a gap of the fast sensor by what it would have said, and enlarge Qc")
+        raise ValueError(
+            "inputs must be finite: fill a gap of the fast sensor by what it would have said, and "
+            "enlarge Qc"
+        )
 
 
 def sample(
-    dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: int | np.random.Generator, inputs: Inputs | None = None
+    dynamics: Dynamics,
+    prior: Gaussian,
+    times: Array,
+    runs: int,
+    seed: int | np.random.Generator,
+    inputs: Inputs | None = None,
 ) -> Path:
     """True paths of the dynamics, exact at the given times.
 
@@ -234,14 +281,24 @@ def sample(
         Times not ascending, a prior or inputs that do not fit.
     """
     times = np.asarray(times, dtype=float)
-    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-        raise ValueError("times must be a finite ascending vector; np.unique sorts and removes what is twice")
+    if (
+        times.ndim != 1
+        or not len(times)
+        or not np.isfinite(times).all()
+        or (np.diff(times) <= 0).any()
+    ):
+        raise ValueError(
+            "times must be a finite ascending vector; np.unique sorts and removes what is twice"
+        )
     expect_sizes(runs=runs)
     rng, n = np.random.default_rng(seed), len(dynamics.A)
     check_prior(prior, runs, n)
     over, move = motion(dynamics, inputs)
     if inputs is not None and (given := np.shape(inputs.values)[1]) not in (1, runs):
-        raise ValueError(f"the inputs are those of {given} runs, and {runs} are sampled: give one run's, for all, or as many")
+        raise ValueError(
+            f"the inputs are those of {given} runs, and {runs} are sampled: give one run's, for "
+            f"all, or as many"
+        )
     states = np.empty((len(times), runs, n))
     states[0] = prior.mean + rng.standard_normal((runs, n)) @ square_root(np.asarray(prior.cov)).T
     for k in range(1, len(times)):

@@ -1,15 +1,16 @@
 """The event-driven filter: predict to the moment of capture, correct with that sensor's meter.
 
-A measurement that arrives late belongs to the past.  The filter keeps its laws of the last seconds and the
-measurements between them; it goes back to the law before the moment of capture and works forward again, with the
-late one in its place::
+A measurement that arrives late belongs to the past.  The filter keeps its laws of the last seconds
+and the measurements between them; it goes back to the law before the moment of capture and works
+forward again, with the late one in its place::
 
     t:       1         2         3         4 = now
     kept:   law ----- law ----- law              used so far
     late:         x                              captured at 1.5, arrives at 4
     again:  law - law - law --- law ------->     the same as if it had not been late
 
-Nothing is approximated; the price is memory for the longest delay, and the work of those steps once more.
+Nothing is approximated; the price is memory for the longest delay, and the work of those steps once
+more.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ class Event(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What the filter remembers: the law right after an event (the prior has none), and what it expected of the measurement."""
+    """What the filter remembers: the law right after an event (the prior has none), and what it
+    expected of the measurement."""
 
     time: float
     event: Event | None
@@ -66,7 +68,8 @@ class Told(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """Estimates, as of `fuse`, and the innovations of all measurements, in the order of their moments."""
+    """Estimates, as of `fuse`, and the innovations of all measurements, in the order of their
+    moments."""
 
     law: Gaussian
     innovations: list[Told]
@@ -90,13 +93,15 @@ def fuse(
     ----------
     dynamics : Dynamics
     sensors : sequence of Sensor
-        As the filter believes them to be: their meters, and clocks that turn tags into the filter's time.
+        As the filter believes them to be: their meters, and clocks that turn tags into the filter's
+        time.
     prior : Gaussian
         Law of the state at `start`: mean (n,) or (runs, n), covariance (n, n) or (runs, n, n).
     observations : sequence of Observation
         In any order.
     times : ndarray (s,)
-        When estimates are wanted, ascending.  The estimate for a moment uses what has *arrived* by then.
+        When estimates are wanted, ascending.  The estimate for a moment uses what has *arrived* by
+        then.
     inputs : Inputs, optional
         The known input of the dynamics.
     by : {"tag", "arrival"}
@@ -114,10 +119,13 @@ def fuse(
     Raises
     ------
     ValueError
-        Sensors not known or of another state, moments not finite, before `start`, or after the arrival; a measurement older
-        than `depth`; a prior with a negative variance; shapes that do not fit.
+        Sensors not known or of another state, moments not finite, before `start`, or after the
+        arrival; a measurement older than `depth`; a prior with a negative variance; shapes that do
+        not fit.
     """
-    return _run(dynamics, sensors, prior, observations, times, inputs, by, depth, start, lambda past: None)
+    return _run(
+        dynamics, sensors, prior, observations, times, inputs, by, depth, start, lambda past: None
+    )
 
 
 def follow(
@@ -131,18 +139,29 @@ def follow(
     by: str = "tag",
     start: float = 0.0,
 ) -> Followed:
-    """As `fuse`, with the innovations: each as it was when all measurements captured before it had come.
+    """As `fuse`, with the innovations: each as it was when all measurements captured before it had
+    come.
 
-    Arguments and errors as of `fuse`.  What arrives after the last of `times` is not used, and told nothing.
+    Arguments and errors as of `fuse`.  What arrives after the last of `times` is not used, and told
+    nothing.
     """
     told: list[Told] = []
 
     def keep(past: Past) -> None:
         if past.event and past.expected:
             innovation, F = past.expected.innovation(past.event.value), past.expected.F
-            told.append(Told(past.event.sensor.name, past.event.time, innovation, F.reshape(-1, *F.shape[-2:])))
+            told.append(
+                Told(
+                    past.event.sensor.name,
+                    past.event.time,
+                    innovation,
+                    F.reshape(-1, *F.shape[-2:]),
+                )
+            )
 
-    return Followed(_run(dynamics, sensors, prior, observations, times, inputs, by, None, start, keep), told)
+    return Followed(
+        _run(dynamics, sensors, prior, observations, times, inputs, by, None, start, keep), told
+    )
 
 
 def _run(
@@ -157,23 +176,31 @@ def _run(
     start: float,
     keep: Callable[[Past], None],
 ) -> Gaussian:
-    """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of what is left in the end."""
+    """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of
+    what is left in the end."""
     expect(dynamics, Dynamics, "fuse")
     predict, n = predictor(dynamics, inputs), len(dynamics.A)
     for sensor in sensors:
         if sensor.model.n != n:
             raise ValueError(
-                f"{sensor.name} was defined with {sensor.model.n} state component(s), and the motion has {n}: "
+                f"{sensor.name} was defined with {sensor.model.n} state component(s), and the "
+                f"motion has {n}: "
                 "Sensor.define takes the names of all, in the order of the motion"
             )
     moments = _checked_times(times, start)
-    slack = rounding(moments, *(one.tag for one in observations), *(one.arrival for one in observations), start)
-    events = sorted(_events(sensors, observations, by, start, slack), key=lambda event: event.arrival)
+    slack = rounding(
+        moments, *(one.tag for one in observations), *(one.arrival for one in observations), start
+    )
+    events = sorted(
+        _events(sensors, observations, by, start, slack), key=lambda event: event.arrival
+    )
     depth = _checked_depth(events, depth, slack)
     history = [Past(start, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
     for now in moments:
-        arrived = events[taken : bisect_right(events, now + slack, lo=taken, key=lambda event: event.arrival)]
+        arrived = events[
+            taken : bisect_right(events, now + slack, lo=taken, key=lambda event: event.arrival)
+        ]
         taken += len(arrived)
         history = _replayed(history, arrived, predict)
         laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
@@ -187,7 +214,8 @@ def _run(
 
 
 def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
-    """The history with the events that have arrived: back to before the earliest of them, and forward again."""
+    """The history with the events that have arrived: back to before the earliest of them, and
+    forward again."""
     if not arrived:
         return history
     kept = bisect_right(history, min(event.time for event in arrived), key=lambda past: past.time)
@@ -201,35 +229,52 @@ def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> 
 
 
 def _oldest_needed(history: list[Past], reach: float) -> int:
-    """Index of the last law at or before the earliest moment that a measurement may still come from."""
+    """Index of the last law at or before the earliest moment that a measurement may still come
+    from."""
     return max(bisect_right(history, reach, key=lambda past: past.time) - 1, 0)
 
 
-def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: str, start: float, slack: float) -> list[Event]:
+def _events(
+    sensors: Sequence[Sensor],
+    observations: Sequence[Observation],
+    by: str,
+    start: float,
+    slack: float,
+) -> list[Event]:
     if by not in ("tag", "arrival"):
         raise ValueError(f'measurements are used by "tag" or by "arrival", not by {by!r}')
     table, events = by_name(sensors), []
     for name, tag, arrival, value in observations:
         if name not in table:
-            raise ValueError(f"a measurement of {name!r}, but the filter knows only {', '.join(table) or 'no sensor'}")
+            raise ValueError(
+                f"a measurement of {name!r}, but the filter knows only "
+                f"{', '.join(table) or 'no sensor'}"
+            )
         sensor = table[name]
         if not (np.isfinite(tag) and np.isfinite(arrival)):
             raise ValueError(
-                f"{name}: tag and arrival must be finite, got {tag} and {arrival}; drop what cannot be placed in time"
+                f"{name}: tag and arrival must be finite, got {tag} and {arrival}; drop what "
+                f"cannot be placed in time"
             )
         if np.ndim(value) != 2 or np.shape(value)[1] != sensor.model.p:
-            raise ValueError(f"{name}: a measurement must have the shape (runs, {sensor.model.p}), got {np.shape(value)}")
+            raise ValueError(
+                f"{name}: a measurement must have the shape (runs, {sensor.model.p}), got "
+                f"{np.shape(value)}"
+            )
         if np.isinf(value).any():
             raise ValueError(f"{name}: a measurement must be finite, or NaN where it is missing")
         time = sensor.clock.time(tag) if by == "tag" else arrival
         if time > arrival + slack:
             raise ValueError(
-                f"{name}: captured at t = {time:.16g} s by its tag, but arrived before that, at {arrival:.16g} s; "
-                f"the filter's clock for this sensor, {sensor.clock}, must be wrong: Clock.fit finds it from interrupts"
+                f"{name}: captured at t = {time:.16g} s by its tag, but arrived before that, at "
+                f"{arrival:.16g} s; "
+                f"the filter's clock for this sensor, {sensor.clock}, must be wrong: Clock.fit "
+                f"finds it from interrupts"
             )
         if time < start - slack:
             raise ValueError(
-                f"{name}: captured at t = {time:.16g} s, before the prior's {start:.16g} s; leave it out, or start earlier"
+                f"{name}: captured at t = {time:.16g} s, before the prior's {start:.16g} s; leave "
+                f"it out, or start earlier"
             )
         events.append(Event(max(time, start), arrival, sensor, np.asarray(value, dtype=float)))
     return events
@@ -238,35 +283,58 @@ def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: 
 def _checked_depth(events: Sequence[Event], depth: float | None, slack: float) -> float:
     """Seconds that the filter must remember."""
     if depth is not None and not depth >= 0:
-        raise ValueError(f"depth is how many seconds back the filter remembers: expected a number not below 0, got {depth}")
+        raise ValueError(
+            f"depth is how many seconds back the filter remembers: expected a number not below 0, "
+            f"got {depth}"
+        )
     if not events:
         return 0.0
     latest = max(events, key=lambda event: event.arrival - event.time)
     needed = latest.arrival - latest.time
     if depth is not None and needed > depth + slack:
         raise ValueError(
-            f"{latest.sensor.name}: captured at t = {latest.time:.16g} s, arrived at {latest.arrival:.16g} s, but "
-            f"the filter remembers only {depth:g} s; give depth={needed:g} or more, or leave such measurements out"
+            f"{latest.sensor.name}: captured at t = {latest.time:.16g} s, arrived at "
+            f"{latest.arrival:.16g} s, but "
+            f"the filter remembers only {depth:g} s; give depth={needed:g} or more, or leave such "
+            f"measurements out"
         )
     return needed if depth is None else depth
 
 
 def _checked_times(times: Array, start: float) -> list[float]:
     moments = np.asarray(times, dtype=float)
-    if moments.ndim != 1 or not len(moments) or not np.isfinite(moments).all() or (np.diff(moments) < 0).any():
+    if (
+        moments.ndim != 1
+        or not len(moments)
+        or not np.isfinite(moments).all()
+        or (np.diff(moments) < 0).any()
+    ):
         raise ValueError("times of estimates must be a finite ascending vector")
     if moments[0] < start:
-        raise ValueError(f"an estimate is wanted at t = {moments[0]:.16g} s, before the prior's {start:.16g} s; start earlier")
+        raise ValueError(
+            f"an estimate is wanted at t = {moments[0]:.16g} s, before the prior's {start:.16g} "
+            f"s; start earlier"
+        )
     return moments.tolist()
 
 
-def _checked_prior(prior: Gaussian, n: int, events: Sequence[Event], inputs: Inputs | None) -> Gaussian:
-    """The prior with a mean for each run; the number of runs is that of the measurements, inputs, or the prior itself."""
+def _checked_prior(
+    prior: Gaussian, n: int, events: Sequence[Event], inputs: Inputs | None
+) -> Gaussian:
+    """The prior with a mean for each run; the number of runs is that of the measurements, inputs,
+    or the prior itself."""
     mean, cov = np.asarray(prior.mean, dtype=float), np.asarray(prior.cov, dtype=float)
-    sizes = {1, *(len(event.value) for event in events), *([] if inputs is None else [np.shape(inputs.values)[1]])}
+    sizes = {
+        1,
+        *(len(event.value) for event in events),
+        *([] if inputs is None else [np.shape(inputs.values)[1]]),
+    }
     sizes |= {len(mean)} if mean.ndim == 2 else set()
     if len(sizes - {1}) > 1:
-        raise ValueError(f"measurements, inputs and prior are of different numbers of runs: {sorted(sizes - {1})}")
+        raise ValueError(
+            f"measurements, inputs and prior are of different numbers of runs: "
+            f"{sorted(sizes - {1})}"
+        )
     runs = max(sizes)
     check_prior(prior, runs, n)
     return Gaussian(np.broadcast_to(mean, (runs, n)), cov)

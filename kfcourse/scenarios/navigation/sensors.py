@@ -2,9 +2,11 @@
 
 ::
 
-    capture at t_j   --interrupt: the time tag-->   ...   --the data, over an interface-->   arrival at a_j >= t_j
+    capture at t_j   --interrupt: the time tag-->   ...   --the data, over an interface-->
+        arrival at a_j >= t_j
 
-Each sensor's clock reads rate * t + shift at the filter's time t; its samples are equally spaced on that clock.
+Each sensor's clock reads rate * t + shift at the filter's time t; its samples are equally spaced on
+that clock.
 """
 
 from __future__ import annotations
@@ -43,32 +45,39 @@ class Clock(NamedTuple):
 
     @classmethod
     def fit(cls, times: Array, readings: Array) -> Clock:
-        """The clock from pairs: interrupts at the filter's times (s,), and the sensor's own readings (s,) at the same moments.
+        """The clock from pairs: interrupts at the filter's times (s,), and the sensor's own
+        readings (s,) at the same moments.
 
-        Least squares of times on readings, time = a + b reading: the error is in the times, an interrupt being served with a
-        delay, while a sensor knows its own clock.
+        Least squares of times on readings, time = a + b reading: the error is in the times, an
+        interrupt being served with a delay, while a sensor knows its own clock.
 
         Raises
         ------
         ValueError
-            Fewer than two different readings, pairs that are not finite, readings that do not grow with the times.
+            Fewer than two different readings, pairs that are not finite, readings that do not grow
+            with the times.
         """
         times, readings = np.asarray(times, dtype=float), np.asarray(readings, dtype=float)
         if times.shape != readings.shape or times.ndim != 1 or len(np.unique(readings)) < 2:
             raise ValueError(
-                f"the clock needs two or more pairs of times and readings, got the shapes {times.shape} and {readings.shape}"
+                f"the clock needs two or more pairs of times and readings, got the shapes "
+                f"{times.shape} and {readings.shape}"
             )
         # Around the means: readings such as seconds of the week are large beside their differences.
         deviation = readings - readings.mean()
         slope = deviation @ (times - times.mean()) / (deviation @ deviation)
         if not slope > 0:
-            raise ValueError("the readings of a clock grow with the times, and both are finite: drop pairs where they do not")
+            raise ValueError(
+                "the readings of a clock grow with the times, and both are finite: drop pairs "
+                "where they do not"
+            )
         return cls(float(1 / slope), float(readings.mean() - times.mean() / slope))
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor; build it with `Sensor.define`.  `observe` takes the true ones, `fuse` those that the filter believes in.
+    """A sensor; build it with `Sensor.define`.  `observe` takes the true ones, `fuse` those that
+    the filter believes in.
 
     Attributes
     ----------
@@ -76,14 +85,17 @@ class Sensor:
     model : Model
         Its meter equation is the sensor's; the state equation is not used.
     period : float, optional
-        Between samples, in s of its own clock; None for recorded data, whose moments are those of their observations.
+        Between samples, in s of its own clock; None for recorded data, whose moments are those of
+        their observations.
     offset : float
         Its clock's reading at some sample.
     latency, jitter : float
-        The data arrive latency + jitter * U after the capture (s), U uniform in (0, 1): the filter does not use these.
+        The data arrive latency + jitter * U after the capture (s), U uniform in (0, 1): the filter
+        does not use these.
     clock : Clock
     structure : callable
-        Model -> Structure, which approximation of the meter the filter uses: `linearised`, `gaussian`, `unscented`.
+        Model -> Structure, which approximation of the meter the filter uses: `linearised`,
+        `gaussian`, `unscented`.
     """
 
     name: str
@@ -96,7 +108,8 @@ class Sensor:
     structure: Callable[[Model], Structure] = linearised
 
     def __post_init__(self) -> None:
-        timing = {"latency": self.latency, "jitter": self.jitter}  # data cannot arrive before they are captured
+        # data cannot arrive before they are captured
+        timing = {"latency": self.latency, "jitter": self.jitter}
         expect_not_negative(**{f"{self.name}: {name}": value for name, value in timing.items()})
         if self.period is not None:
             expect_positive(**{f"{self.name}: the period": self.period})
@@ -104,11 +117,19 @@ class Sensor:
             raise ValueError(f"{self.name}: offset must be finite, got {self.offset}")
         if self.model.timed:
             raise ModelError(
-                f"{self.name}: the meter depends on the step, {self.model.known.symbols}, but a sensor has moments of its own; "
+                f"{self.name}: the meter depends on the step, {self.model.known.symbols}, but a "
+                f"sensor has moments of its own; "
                 "write what changes into the state"
             )
-        if not (math.isfinite(self.clock.rate) and math.isfinite(self.clock.shift) and self.clock.rate > 0):
-            raise ValueError(f"{self.name}: the clock must have a positive finite rate and a finite shift, got {self.clock}")
+        if not (
+            math.isfinite(self.clock.rate)
+            and math.isfinite(self.clock.shift)
+            and self.clock.rate > 0
+        ):
+            raise ValueError(
+                f"{self.name}: the clock must have a positive finite rate and a finite shift, got "
+                f"{self.clock}"
+            )
 
     @classmethod
     def define(
@@ -149,8 +170,8 @@ class Sensor:
         Examples
         --------
         >>> from kfcourse.scenarios.navigation import Sensor
-        >>> Sensor.define("range", ["s", "h", "V"], "sqrt(s**2 + h**2) + w", variance=100.0, period=0.25).model.p
-        1
+        >>> Sensor.define("range", ["s", "h", "V"], "sqrt(s**2 + h**2) + w", variance=100.0,
+        period=0.25).model.p 1
         """
         model = Model.define(
             list(states),
@@ -168,12 +189,16 @@ class Sensor:
         return self.structure(self.model).measure
 
     def captures(self, duration: float) -> Array:
-        """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a period, or for no duration."""
+        """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a
+        period, or for no duration."""
         if not 0 <= duration < math.inf:
-            raise ValueError(f"a duration is a finite number of seconds, not below 0; got {duration}")
+            raise ValueError(
+                f"a duration is a finite number of seconds, not below 0; got {duration}"
+            )
         if self.period is None:
             raise ValueError(
-                f"{self.name} has no period, as a recorded sensor: its observations have their moments; give one to simulate it"
+                f"{self.name} has no period, as a recorded sensor: its observations have their "
+                f"moments; give one to simulate it"
             )
         ends = [(self.clock.reading(end) - self.offset) / self.period for end in (0.0, duration)]
         first, last = math.ceil(ends[0] - rounding(*ends)), math.floor(ends[1] + rounding(*ends))
@@ -206,7 +231,10 @@ class Observation(NamedTuple):
 
 
 def observe(
-    sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration: float, seed: int | np.random.Generator
+    sensors: Sequence[Sensor],
+    truth: Callable[[Array], Array],
+    duration: float,
+    seed: int | np.random.Generator,
 ) -> list[Observation]:
     """What the sensors say of a motion, in the order of arrival.
 
@@ -215,11 +243,13 @@ def observe(
     sensors : sequence of Sensor
         The true ones.
     truth : callable
-        Times (s,) -> states (s, runs, n): a formula, or a `Path` that holds the moments of all `captures`.
+        Times (s,) -> states (s, runs, n): a formula, or a `Path` that holds the moments of all
+        `captures`.
     duration : float
         Captures from 0 to duration; the last ones may arrive later.
     seed : int or Generator
-        Each sensor draws from a stream of its own: one more at the end of the list does not change the others.
+        Each sensor draws from a stream of its own: one more at the end of the list does not change
+        the others.
 
     Returns
     -------
@@ -238,13 +268,16 @@ def observe(
         x = np.asarray(truth(times))
         if x.ndim != 3 or len(x) != len(times) or x.shape[2] != model.n:
             raise ValueError(
-                f"{sensor.name}: the truth at {len(times)} moments must have the shape ({len(times)}, runs, {model.n}), "
+                f"{sensor.name}: the truth at {len(times)} moments must have the shape "
+                f"({len(times)}, runs, {model.n}), "
                 f"got {x.shape}"
             )
         arrivals = times + sensor.delays(len(times), rng)
         law = model.meter_noise
         w = law.mean + rng.standard_normal((*x.shape[:2], len(law.mean))) @ square_root(law.cov).T
-        values = on_circle(np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p)), model.angles.y)
+        values = on_circle(
+            np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p)), model.angles.y
+        )
         tags = sensor.clock.reading(times)
         messages += [
             Observation(sensor.name, float(tag), float(arrival), value)
@@ -257,5 +290,8 @@ def by_name(sensors: Sequence[Sensor]) -> dict[str, Sensor]:
     """Sensors by their names; ValueError if two share one."""
     table = {sensor.name: sensor for sensor in sensors}
     if len(table) < len(sensors):
-        raise ValueError(f"each sensor needs a name of its own, got {', '.join(sensor.name for sensor in sensors)}")
+        raise ValueError(
+            f"each sensor needs a name of its own, got "
+            f"{', '.join(sensor.name for sensor in sensors)}"
+        )
     return table
