@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-MOVED: dict[str, str] = {}
+MOVED: dict[str, str] = {
+    "extended-kalman": "linearisation",
+}
 
 
 def pages(app) -> Iterator[tuple[str, dict[str, str], str]]:

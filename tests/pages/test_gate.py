@@ -32,20 +32,16 @@ ALONE = {
 }
 # One change in each chapter that derives something.
 CHANGES = {
-    "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
+    "stratonovich": ("(e - K * nu) ** 2 / p_", "(e + K * nu) ** 2 / p_"),
     "grid": ("2 * sp.integrate(density * wave", "-2 * sp.integrate(density * wave"),
     "linearisation": (
-        "linear_f, constant_g2 = f + f1 * (before - z)",
-        "linear_f, constant_g2 = f - f1 * (before - z)",
+        "log_normal(y, S + S1 * (x - lam), D_n)",
+        "log_normal(y, S - S1 * (x - lam), D_n)",
     ),
     "when-linearisation-fails": ("(M_e, -K_k * S2 * Psi / 2)", "(M_e, K_k * S2 * Psi / 2)"),
     "better-than-a-tangent": (
         "second = f + f1 * u + f2 * u**2 / 2",
         "second = f + f1 * u - f2 * u**2 / 2",
-    ),
-    "extended-kalman": (
-        '(s["F"], s["H"] * s["Psi"] * s["H"].T + s["D_n"])',
-        '(s["F"], s["H"] * s["Psi"] * s["H"].T - s["D_n"])',
     ),
     "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
     "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
