@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 MOVED: dict[str, str] = {
     "extended-kalman": "linearisation",
+    "lecture-continuous": "continuous",
 }
 
 

@@ -25,7 +25,6 @@ ALONE = {
     "cycle-slips",
     "grid",
     "integration-limits",
-    "lecture-continuous",
     "manoeuvres",
     "radar-extended",
     "wiener",
@@ -51,7 +50,6 @@ CHANGES = {
     ),
     "cycle-slips": ("inner = sp.Integral(sp.exp(-V(a))", "inner = sp.Integral(sp.exp(V(a))"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
-    "lecture-continuous": ("pull = 2 * N2.inv()", "pull = -2 * N2.inv()"),
     "structural-functions": (
         "a.diff(x) ** 2 * p + a.diff(v) ** 2",
         "a.diff(x) ** 2 * p - a.diff(v) ** 2",
