@@ -42,7 +42,7 @@ CHANGES = {
         "second = f + f1 * u + f2 * u**2 / 2",
         "second = f + f1 * u - f2 * u**2 / 2",
     ),
-    "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
+    "consistency": ("sp.sqrt(-2 * sp.log(1 - beta))", "sp.sqrt(2 * sp.log(1 - beta))"),
     "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": (
         "u = signal.jacobian(phi).T * D_n.inv() * miss",
