@@ -45,8 +45,8 @@ CHANGES = {
     "consistency": ("sp.sqrt(-2 * sp.log(1 - beta))", "sp.sqrt(2 * sp.log(1 - beta))"),
     "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": (
-        "u = signal.jacobian(phi).T * D_n.inv() * miss",
-        "u = -signal.jacobian(phi).T * D_n.inv() * miss",
+        "u = S.diff(phi) * (Y - S) / noise",
+        "u = -S.diff(phi) * (Y - S) / noise",
     ),
     "cycle-slips": ("inner = sp.Integral(sp.exp(-V(a))", "inner = sp.Integral(sp.exp(V(a))"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
