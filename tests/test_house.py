@@ -196,7 +196,7 @@ ROOMS = {
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 16_650,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 22_260,
+    "kfcourse/lab": 21_910,
     "kfcourse/linear": 7_030,
     "kfcourse/montecarlo": 10_420,
     "kfcourse/notebooks": 26_930,
@@ -204,7 +204,7 @@ ROOMS = {
     "kfcourse/records": 6_720,
     "kfcourse/scenarios": 12_180,
     "kfcourse/symbolic": 24_810,
-    "tests": 225_680,
+    "tests": 225_400,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
