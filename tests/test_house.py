@@ -196,15 +196,15 @@ ROOMS = {
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 16_650,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 22_260,
+    "kfcourse/lab": 22_160,
     "kfcourse/linear": 7_030,
     "kfcourse/montecarlo": 10_390,
     "kfcourse/notebooks": 26_930,
     "kfcourse/pages": 10_520,
-    "kfcourse/records": 6_720,
+    "kfcourse/records": 6_320,
     "kfcourse/scenarios": 12_180,
     "kfcourse/symbolic": 24_810,
-    "tests": 225_560,
+    "tests": 225_480,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
