@@ -216,8 +216,9 @@ def lab(
     """
     chosen = find_variant(variant, variants_file)
     model = chosen.model
+    jumps = isinstance(model, JumpModel)
+    entries, usual = (JUMP_FILTERS, JUMP_LAB) if jumps else (FILTERS, LAB)
     if names is None:
-        usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
         bound = bound or has_exact(model)
         wanted = [*usual, EXACT] if bound else list(usual)
         if not bound:
@@ -227,8 +228,7 @@ def lab(
                 err=True,
             )
     else:
-        wanted = [name.strip() for name in names.split(",") if name.strip()]
-    entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
+        wanted = _names(names)
     check_names(wanted, entries)
     known = {answer.name: answer for answer in admissions(model, seconds=DERIVATION)}
     answers = [known[name] for name in dict.fromkeys(wanted)]
@@ -243,25 +243,16 @@ def lab(
     for remark, titles in remarks.items():
         click.echo(f"{', '.join(titles)}: {remark}", err=True)
     if len(refused) == len(answers):
-        raise click.ClickException(
-            "; ".join(f"{name}: {reason}" for name, reason in refused.items())
-            or "give at least one filter: --filters duof,aof-gaussian"
-        )
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
+        raise click.ClickException(reasons or "give at least one filter: --filters duof")
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     filters = [answer.built for answer in answers if answer.built]
     result = without_failing(
-        filters,
-        model,
-        runs,
-        steps or chosen.steps,
-        seed,
-        left_out=refused,
-        same_ensemble=same_ensemble,
-        jobs=jobs,
-        dask=dask,
-    )
+        filters, model, runs, steps or chosen.steps, seed,
+        left_out=refused, same_ensemble=same_ensemble, jobs=jobs, dask=dask,
+    )  # fmt: skip
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
     to_error = str(json_file) in STANDARD_OUTPUT
@@ -408,10 +399,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
         )
     generated = grammar.generate(wanted, seed, runs, jobs, unposed)
     reasons = ", ".join(f"{number} {reason}" for reason, number in generated.rejected.most_common())
-    click.echo(
-        f"{generated.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}",
-        err=True,
-    )
+    click.echo(f"{generated.rejected.total()} candidates rejected: {reasons}", err=True)
     if generated.variants:
         text = (
             f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs "
