@@ -47,7 +47,7 @@ from kfcourse.derivations.values import ENTIRE, Uncomputed, Values
 from kfcourse.laws import Array
 
 CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly
-MOST_TRIED = 20000  # changes
+MOST_TRIED = 30000  # changes
 COSTS = {  # what is named if several changes explain a line
     "sign": 1.0,
     "doubled": 1.05,
@@ -67,6 +67,7 @@ NUMBERS = [  # in front of a term
     *(Fraction(p, q) for q in range(1, 7) for p in range(1, 7) if p != q and gcd(p, q) == 1),
 ]
 POWERS = (1, 2, 3, 4, Fraction(1, 2), -1, -2)
+PROBES = Fraction(17, 60), Fraction(71, 60), Fraction(-49, 60)  # values of a node
 OF_THE_LINE_ABOVE = 1.0  # an addition to the cost
 
 
@@ -190,7 +191,7 @@ class _Search:
             target = self.mine if other else self.theirs
             for path, node in walk(root):
                 around = [at(root, path[:i]) for i in range(len(path))]
-                wanted = self._wanted(root, path, node, around, target)
+                wanted = self._wanted(root, path, around, target)
                 changes = self._of_moments(path, node, around, moments, other)
                 if not other:
                     changes = chain(changes, self._of_node(path, node, around, wanted))
@@ -219,18 +220,20 @@ class _Search:
                 return bool(np.all(np.abs(left) <= 1e-9))
         return False
 
-    def _wanted(
-        self, root: Node, path: Path, node: Node, around: list[Node], target: Array
-    ) -> Array | None:
-        """What the value of a node should be; None if the line is not linear in that."""
-        for one, i in zip(around, path, strict=True):
-            if one.kind != SUM and (one.kind != PRODUCT or one.data[i] < 0):
-                return None
-        slope = self.values.of(changed(root, path, number(1))) - self.values.of(
-            changed(root, path, number(0))
-        )
+    def _wanted(self, root: Node, path: Path, around: list[Node], target: Array) -> Array | None:
+        """What the value of a node should be; None inside a power, a function or a mean.
+
+        Outside of them the line is (a + b t)/(c + d t), t the value: four of such values have one
+        cross-ratio with those of t.
+        """
+        if any(one.kind not in (SUM, PRODUCT) for one in around):
+            return None
+        p, q, r = PROBES
+        first, second, third = (self.values.of(changed(root, path, number(one))) for one in PROBES)
         with np.errstate(all="ignore"):
-            wanted = self.values.of(node, keep=True) + (target - self.values.of(root)) / slope
+            ratio = (target - first) * (second - third) / (target - third) / (second - first)
+            ratio = ratio * float((q - p) / (q - r))
+            wanted = (float(p) - ratio * float(r)) / (1 - ratio)
         return wanted if np.isfinite(wanted).all() else None
 
     def _of_moments(
@@ -250,6 +253,7 @@ class _Search:
         """Changes of one node of the line: cost, slip, the new node."""
         parts, data = node.parts, node.data
         outer = around[-1].kind if around else ""
+        beside = bool(around) and len(around[-1].parts) > 1
 
         def slip(
             kind: str,
@@ -288,7 +292,8 @@ class _Search:
                 yield slip("extra", rest, name, below=(i,))
         if outer != PRODUCT:
             for q in NUMBERS:
-                yield slip("sign" if q == -1 else "factor", product(number(q), node))
+                kind, new = "sign" if q == -1 else "factor", product(number(q), node)
+                yield slip(kind, new, more=0.35 * (node.kind == LETTER and beside))
             for name in self.pool:
                 for k in (1, 2):
                     yield slip("lost-factor", product(power(letter(name), k), node), name)

@@ -10,14 +10,14 @@
   };
   const ENTIRE = ["exp", "sin", "cos", "sinh", "cosh"];
   const MEANS = ["M", "D", "Cov"];
-  const ROUNDING = 1e-10, CLEAR = 1e-4, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, MOST_TRIED = 20000, SECONDS = 3;
+  const ROUNDING = 1e-10, CLEAR = 1e-4, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, MOST_TRIED = 30000, SECONDS = 3;
   const LONGEST = 600, DEEPEST = 60, MAX_LENGTH = 2000, MAX_EXPONENT = 16, MOST_LINES = 400;
   const COSTS = {
     sign: 1, doubled: 1.05, letter: 1.1, moment: 1.25, power: 1.2, factor: 1.2, "noise-forgotten": 1.22, "noise-mean": 1.45,
     "lost-factor": 1.3, extra: 1.4, function: 1.4, lost: 1.5,
   };
   const NUMBERS = [-1, 2, 3, 4, 5, 6, 1 / 2, 3 / 2, 5 / 2, 1 / 3, 2 / 3, 4 / 3, 5 / 3, 1 / 4, 3 / 4, 5 / 4, 1 / 5, 2 / 5, 3 / 5, 4 / 5, 6 / 5, 1 / 6, 5 / 6];
-  const POWERS = [1, 2, 3, 4, 0.5, -1, -2], OF_THE_LINE_ABOVE = 1;
+  const POWERS = [1, 2, 3, 4, 0.5, -1, -2], OF_THE_LINE_ABOVE = 1, PROBES = [17 / 60, 71 / 60, -49 / 60];
   const OF_FILTERS = ["y", "K", "R", "lambda", "Psi", "m", "d", "z", "p", "tau", "Theta", "h", "G", "F"];
 
   class Unreadable extends Error {
@@ -604,7 +604,7 @@
       let count = 0;
       for (const [root, target, ofAbove] of [[this.line, this.theirs, false], [this.above, this.mine, true]]) {
         for (const [path, node] of walk(root)) {
-          const around = path.map((_, i) => at(root, path.slice(0, i))), wanted = this.wanted(root, path, node, around, target);
+          const around = path.map((_, i) => at(root, path.slice(0, i))), wanted = this.wanted(root, path, around, target);
           const changes = this.ofMoments(path, node, around, moments, ofAbove);
           if (!ofAbove) changes.push(...this.ofNode(path, node, around, wanted));
           for (const [cost, slip, other] of changes) {
@@ -634,11 +634,14 @@
       return this.values.of(kind === "lost-factor" ? outer.parts[0] : outer).every((one) => Math.abs(one) <= 1e-9);
     }
 
-    // what the value of a node should be; null if the line is not linear in that
-    wanted(root, path, node, around, target) {
-      if (around.some((one, i) => one.kind !== "sum" && (one.kind !== "product" || one.data[path[i]] < 0))) return null;
-      const [one, zero] = [1, 0].map((value) => this.values.of(changed(root, path, number(value)))), here = this.values.of(root);
-      const wanted = this.values.of(node).map((v, p) => v + (target[p] - here[p]) / (one[p] - zero[p]));
+    // what the value of a node should be; null inside a power, a function or a mean: outside the line is (a + b t)/(c + d t)
+    wanted(root, path, around, target) {
+      if (around.some((one) => !["sum", "product"].includes(one.kind))) return null;
+      const [p, q, r] = PROBES, [first, second, third] = PROBES.map((value) => this.values.of(changed(root, path, number(value))));
+      const wanted = target.map((v, i) => {
+        const ratio = ((((v - first[i]) * (second[i] - third[i])) / (v - third[i]) / (second[i] - first[i])) * (q - p)) / (q - r);
+        return (p - ratio * r) / (1 - ratio);
+      });
       return wanted.every(Number.isFinite) ? wanted : null;
     }
 
@@ -652,6 +655,7 @@
 
     ofNode(path, node, around, wanted) {
       const found = [], { kind, parts, data } = node, outer = around.length ? around[around.length - 1].kind : "";
+      const beside = around.length && around[around.length - 1].parts.length > 1;
       const add = (what, other, name = "", below = [], more = 0, lost = null) =>
         found.push([COSTS[what] + more, makeSlip(what, [...path, ...below], name, { lost }), other]);
       const without = (i, value) => make(kind, parts.map((part, j) => (i === j ? number(value) : part)), data);
@@ -669,7 +673,7 @@
       if (kind === "call") for (const name of ENTIRE) add("function", make("call", parts, name), data);
       if (kind === "product") parts.forEach((part, i) => add("extra", without(i, 1), nameOf(part), [i]));
       if (outer !== "product") {
-        for (const q of NUMBERS) add(q === -1 ? "sign" : "factor", product([number(q), node]));
+        for (const q of NUMBERS) add(q === -1 ? "sign" : "factor", product([number(q), node]), "", [], kind === "letter" && beside ? 0.35 : 0);
         for (const name of this.pool) for (const k of [1, 2]) add("lost-factor", product([power(letter(name), k), node]), name);
       }
       if (outer !== "sum") {
