@@ -194,7 +194,7 @@ ROOMS = {
     "kfcourse/*.py": 6_500,
     "kfcourse/checks": 20_300,
     "kfcourse/continuous": 8_600,
-    "kfcourse/derivations": 16_650,
+    "kfcourse/derivations": 14_850,
     "kfcourse/filters": 33_830,
     "kfcourse/lab": 21_910,
     "kfcourse/linear": 7_030,
