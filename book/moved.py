@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-MOVED: dict[str, str] = {
+MOVED = {
+    "checking-exact": "comparison",
+    "derive-it": "live-lab",
     "extended-kalman": "linearisation",
     "lecture-continuous": "continuous",
 }
