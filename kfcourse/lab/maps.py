@@ -3,8 +3,8 @@
 ::
 
     cells = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
-    cells[0.05, 0.02].leaders(1)
-        the most accurate at step 1, and those that are not significantly worse
+    cells[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not
+                                      significantly worse
 """
 
 from __future__ import annotations
