@@ -34,11 +34,14 @@ def by_tangents(rng):
     slopes = {
         r"\frac{\partial a}{\partial x}": 0.9 + 0.4 * z,
         r"\frac{\partial a}{\partial v}": 0.5 * z + 0.1,
+        r"\frac{\partial b}{\partial x}": 1.2,
+        r"\frac{\partial b}{\partial w}": 0.4 * z**2 + 0.3,
     }
     return (
         of_package(linearised(MODEL), z, p)
         | slopes
         | {"a": a, "z": z, "m_v": 0.0, "p": p, "D_v": 1.0}
+        | {"b": b, "m": z, "m_w": 0.0, "d": p, "D_w": 1.0}
     )
 
 
