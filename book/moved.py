@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-MOVED: dict[str, str] = {}
+MOVED = {
+    "better-than-a-tangent": "when-linearisation-fails",
+    "integration-limits": "four-sensors",
+    "manoeuvres": "models-that-jump",
+    "particles": "grid",
+    "radar-extended": "radar-tracking",
+}
 
 
 def pages(app) -> Iterator[tuple[str, dict[str, str], str]]:
