@@ -69,6 +69,8 @@ V, v_x, v_y: num
 LETTERS = (correcting, predicting, failed, joined, turned)
 SAID = {
     NOTATION: [
+        r"\mathsf M\ell\big|_{\text{failed}}",
+        r"\mathsf M\ell\big|_{\text{sound}}",
         "x_{k+1}=a^{i_{k+1}}(x_k,v_k)",
         "y_k=b^{i_k}(x_k,w_k)",
         r"\lambda^{\text{before}}",

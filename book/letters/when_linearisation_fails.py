@@ -129,3 +129,4 @@ SAID = {
     CONDITION: [r"\nu\ll1", r"\frac34\kappa^2\ll1", r"S'\approx0"],
     NOTATION: [r"\mathsf{M}[e^2]/p", r"\mathsf{M}[e^2]/\Psi", r"g^2D_\xi"],
 }
+EQUALS = {r"\frac{\mathsf Me_n^2}{p_n}": r"1+\frac{3\kappa^2}{4n}"}
