@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from types import CodeType, FunctionType
 from typing import Any
@@ -139,9 +139,12 @@ LOST = {
 }
 
 
-def changes(node: ast.AST) -> Iterator[tuple[str, ast.expr]]:
-    """Kind of slip, and what would stand in the place of a node."""
+def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast.expr]]:
+    """Kind of slip, and what would stand in the place of a node; one of these names in that of
+    another."""
     match node:
+        case ast.Name(id=own) if own in names:
+            yield from (("letter", ast.Name(name)) for name in names if name != own)
         case ast.BinOp(left=left, op=op, right=right):
             if type(op) in OPERATORS:
                 kind, opposite = OPERATORS[type(op)]
@@ -173,21 +176,31 @@ def changes(node: ast.AST) -> Iterator[tuple[str, ast.expr]]:
 def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:
     """The key with one node of its source changed, in each way: kind of slip, the key.
 
-    Loops that a change might never end stay as they are.
+    What a change might never end stays as it is: `while`, and what a loop goes through.
     """
     sources = {name: _source(function) for name, function in pieces(key).items()}
-    for name, source in sources.items():
-        nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
-        for place, node in enumerate(nodes):
-            for number, (kind, _) in enumerate(changes(node)):
-                tree = ast.parse(source)
-                old = list(ast.walk(tree))[place]
-                new = list(changes(old))[number][1]
-                for parent in ast.walk(tree):
-                    for field, value in ast.iter_fields(parent):
-                        if value is old:
-                            setattr(parent, field, new)
-                        elif isinstance(value, list):
-                            value[:] = [new if one is old else one for one in value]
-                text = ast.unparse(ast.fix_missing_locations(tree))
-                yield kind, _built(key, {**sources, name: text})
+    for letters in (False, True):  # of which there are many
+        for name, source in sources.items():
+            nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
+            names = sorted({one.arg for one in nodes if isinstance(one, ast.arg)})
+            fixed = [one.iter for one in nodes if isinstance(one, ast.For | ast.comprehension)]
+            left = {id(inner) for one in fixed for inner in ast.walk(one)}
+            for place, node in enumerate(nodes):
+                if isinstance(node, ast.Name) is letters and id(node) not in left:
+                    for number, (kind, _) in enumerate(changes(node, names)):
+                        text = _changed(source, place, number, names)
+                        yield kind, _built(key, {**sources, name: text})
+
+
+def _changed(source: str, place: int, number: int, names: Sequence[str]) -> str:
+    """The source with one of the changes of one node."""
+    tree = ast.parse(source)
+    old = list(ast.walk(tree))[place]
+    _, new = list(changes(old, names))[number]
+    for parent in ast.walk(tree):
+        for field, value in ast.iter_fields(parent):
+            if value is old:
+                setattr(parent, field, new)
+            elif isinstance(value, list):
+                value[:] = [new if one is old else one for one in value]
+    return ast.unparse(ast.fix_missing_locations(tree))

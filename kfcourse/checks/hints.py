@@ -177,6 +177,7 @@ SLIPS = {
     "power-lost": "with a power left out",
     "function-lost": "with a function, such as a root, left out",
     "number": "with another number, index or axis somewhere",
+    "letter": "with one letter in the place of another",
 }
 
 

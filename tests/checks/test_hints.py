@@ -81,6 +81,7 @@ MIXED = asks(mixed, [(RUN[0, 0], RUN[1, 1]), (RUN[2], RUN[3])])
         ("function-lost", "np.sqrt", ""),
         ("factor-lost", "np.sin(a + 2) / ", "1 / "),
         ("number", "3", "4"),
+        ("letter", "(b + 2)", "(a + 2)"),
         ("order", "a + 1, b + 2", "b + 2, a + 1"),
     ],
 )
