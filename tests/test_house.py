@@ -196,14 +196,14 @@ ROOMS = {
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 16_650,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 21_950,
+    "kfcourse/lab": 21_640,
     "kfcourse/linear": 6_910,
     "kfcourse/montecarlo": 10_390,
     "kfcourse/notebooks": 26_930,
     "kfcourse/pages": 10_520,
-    "kfcourse/records": 6_320,
+    "kfcourse/records": 6_250,
     "kfcourse/scenarios": 11_730,
-    "kfcourse/symbolic": 24_600,
+    "kfcourse/symbolic": 24_570,
     "tests": 225_190,
 }
 OF_LAYOUT = {

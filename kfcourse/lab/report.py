@@ -127,7 +127,7 @@ def remarks_in_words(result: Comparison) -> list[str]:
     return [text.replace("$", "") for text in _report(result).remarks()]
 
 
-def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
+def save_figure(draw: Callable[[Axes], object], folder: Path, name: str) -> None:
     """A figure for the page and for LaTeX, its legend below it, where no curve runs; the same
     numbers give the same files."""
     figure = Figure(figsize=(7, 4.2), layout="constrained")

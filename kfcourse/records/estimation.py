@@ -187,16 +187,16 @@ def profile(
     """
     expect(model, Model, "profile")
     others = [other for other in unknown if other != name]
-    found = []
+    largest = []
     for value in values:
         model = model.replace(**{name: value})
         if others:
             best = estimate(model, y, others, [other for other in positive if other != name])
             model = best.model  # the next search begins here
-            found.append(best.log_likelihood)
+            largest.append(best.log_likelihood)
         else:
-            found.append(float(likelihood(_normal_filter(model), y).sum()))
-    return np.array(found)
+            largest.append(float(likelihood(_normal_filter(model), y).sum()))
+    return np.array(largest)
 
 
 def _checked(
@@ -293,16 +293,16 @@ def _inverse(
         blind[:, None] | blind, np.eye(len(own)), information / np.outer(scale, scale)
     )
     values, directions = np.linalg.eigh(related)
-    told = values > least
-    variance = (directions[:, told] ** 2 / values[told]).sum(axis=1) * (unit / scale) ** 2
+    known = values > least
+    variance = (directions[:, known] ** 2 / values[known]).sum(axis=1) * (unit / scale) ** 2
     variance[blind] = np.inf
-    for direction in directions.T[~told]:
+    for direction in directions.T[~known]:
         part = np.flatnonzero(np.abs(direction) > DIRECTION)
         variance[part] = np.inf
         change = direction[part] * (unit / scale)[part]
         change /= change[np.argmax(np.abs(change))]
         together = ", ".join(
-            f"{names[i]} ({one:+.2g})" for i, one in zip(part.tolist(), change, strict=True)
+            f"{names[i]} ({size:+.2g})" for i, size in zip(part.tolist(), change, strict=True)
         )
         sentences.append(
             f"the record does not tell {together} apart: changed together in these proportions "

@@ -101,7 +101,7 @@ def test_numbers_of_every_library_are_read_as_typed(number):
         ({"parameters": {"__class__": 1}}, "cannot name"),
         ({"symbols": {"u": ["u"]}}, "keys x, v, w"),
         ({"symbols": {"x": ["x", "q"]}}, "1 state equation"),
-        ({"symbols": {"x": []}}, "1 state equation"),
+        ({"symbols": {"x": []}}, "x must be a name or a list of names"),
         ({"prior": {"cov": 1}}, "keys mean and variance"),
         ({"prior": {"variance": -1}}, "negative variance"),
         ({"prior": {"variance": [1, 2]}}, "lists of 1 numbers"),
