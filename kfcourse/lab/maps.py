@@ -19,7 +19,6 @@ from matplotlib.patches import Rectangle
 from kfcourse.lab.plots import style
 from kfcourse.lab.report_text import percent
 from kfcourse.lab.short_names import LAB, lab_filters, title
-from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.symbolic.model import Model
@@ -89,7 +88,7 @@ def parameter_map(
     return ParameterMap((first, second), cells)
 
 
-def draw(cells: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENCE) -> Axes:
+def draw(cells: ParameterMap, step: int, ax: Axes) -> Axes:
     """The map at a step: in each cell the most accurate filter and its distance from the bound, the
     least accurate and its.
 
@@ -99,7 +98,7 @@ def draw(cells: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENC
     for (a, b), result in cells.cells.items():
         x, y = seconds.index(b), firsts.index(a)
         gaps = {name: result.gap(name)[step] for name in result.entrants}
-        best, *others = result.leaders(step, confidence)
+        best, *others = result.leaders(step)
         worst = max(gaps, key=lambda name: float(gaps[name].value))
         more = f", {len(others)} more" if others else ""
         ax.add_patch(

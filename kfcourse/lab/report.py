@@ -31,11 +31,10 @@ from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
 from kfcourse.lab.report_modes import JumpReport
 from kfcourse.lab.report_plain import PlainReport
-from kfcourse.lab.report_sections import ROUNDING, StudentReport
+from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
 from kfcourse.lab.short_names import JUMP_FILTERS, title
 from kfcourse.lab.variants import Variant
-from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate
@@ -227,8 +226,8 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     }
 
 
-def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]:
-    """The ranking in sentences: each filter against the next, significant or not at the confidence.
+def conclusions(result: Comparison) -> list[str]:
+    """The ranking in sentences: each filter against the next, significant or not.
 
     In per cent of the bound, the exact AOF's error variance; without it, of the control's.  Filters
     that diverge are left out.
@@ -237,7 +236,7 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
     sentences = []
     for better, worse in pairwise(ranked):
         difference = result.mean_gap_difference(worse, better)
-        low, high = (100 * float(limit) for limit in difference.interval(confidence))
+        low, high = (100 * float(limit) for limit in difference.interval())
         if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model
             sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
             continue
@@ -247,7 +246,7 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
         sentences.append(
             f"{title(better)} {verdict} {title(worse)}: "
             f"{_three_digits(100 * float(difference.value))} % "
-            f"({100 * confidence:g} % confidence: {_three_digits(low)} to {_three_digits(high)} %)."
+            f"({LEVEL} confidence: {_three_digits(low)} to {_three_digits(high)} %)."
         )
     return sentences
 
