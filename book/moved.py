@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-MOVED: dict[str, str] = {}
+MOVED = {"checking-exact": "comparison", "derive-it": "live-lab"}
 
 
 def pages(app) -> Iterator[tuple[str, dict[str, str], str]]:

@@ -253,6 +253,9 @@ LETTERS = (
 )
 SAID = {
     DEFINITION: [
+        "x_{k+1}=cx_k+ex_kv_k",
+        "y_k=gx_k+fx_k^2w_k",
+        r"x_0\sim\mathcal N(m,d)",
         r"\lambda_0=m",
         r"\Psi_0=d",
         r"e_k=\operatorname{line}(x_k-\lambda_k\mid\omega_k)",

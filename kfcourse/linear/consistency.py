@@ -1,7 +1,7 @@
 """Is a filter right about its own errors?  Tests of its covariance and of its innovations.
 
     NEES   e^T p^-1 e,       e = x_k - z_k            needs the true state: simulation
-    NIS   nu^T F^-1 nu,   nu = y_k - h   needs only measurements: works on the real thing
+    NIS    nu^T F^-1 nu,     nu = y_k - h             needs only measurements, also real ones
     whiteness of the innovations                      likewise
     confidence ellipse  e^T p^-1 e < rho^2, of two components
 

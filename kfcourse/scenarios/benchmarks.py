@@ -3,20 +3,20 @@
 pendulum()               Särkkä and Svensson (2023), with their data: `pendulum_data()`
 car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
-cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and
-Borisov)
+cubic_sensor()           the conditionally minimax line (Pankov, Bosov and Borisov), with
+                         logistic(), inverse_cube_root()
 lorenz(noise)            the attractor of Lorenz (1963), and measurements of it: `lorenz_data(...)`
 stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its
-course: `bearings_data(...)`
+                         course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a
-radar
+                         radar
 passing_target(angles)   a target whose bearing jumps by a turn
-exact_mul(a, b), double_well(a, b, s)   two of Jimenez's objects in continuous time, with his data:
-`jimenez_data(name)`
+exact_mul(a, b)          with double_well(a, b, s) two of Jimenez's objects in continuous time, with
+                         his data: `jimenez_data(name)`
 benes(interval, r)       the object in continuous time whose filter is known exactly (Benes, 1981)
 local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970 (Cobb, 1978):
-`nile()`
+                         `nile()`
 """
 
 from __future__ import annotations

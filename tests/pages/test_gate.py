@@ -65,7 +65,6 @@ CHANGES = {
         "where={epsilon: x - exact, delta: exact - z}",
         "where={epsilon: x - exact, delta: exact + z}",
     ),
-    "checking-exact": ("node = center + scale * sp.sinh(t)", "node = center - scale * sp.sinh(t)"),
     "track-2d": ("velocity = v0 + sp.integrate", "velocity = v0 - sp.integrate"),
     "before-measuring": (
         "(Lambda, 2 * (1 - rho) ** 2 / rho)",
