@@ -148,10 +148,8 @@ def estimate(
         except ValueError:
             return np.inf
 
-    t, unit = (
-        np.where(logs, np.log(np.where(logs, start, 1.0)), start),
-        np.where(logs | (start == 0), 1.0, np.abs(start)),
-    )
+    t = np.where(logs, np.log(np.where(logs, start, 1.0)), start)
+    unit = np.where(logs | (start == 0), 1.0, np.abs(start))
     log_likelihood(t)  # says what is wrong with the start
     with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
         # the second time in the units that the likelihood has at its maximum
@@ -289,9 +287,8 @@ def _inverse(
         for i in np.flatnonzero(blind).tolist()
     ]
     scale = np.sqrt(np.where(blind, 1.0, own))
-    related = np.where(
-        blind[:, None] | blind, np.eye(len(own)), information / np.outer(scale, scale)
-    )
+    scaled = information / np.outer(scale, scale)
+    related = np.where(blind[:, None] | blind, np.eye(len(own)), scaled)
     values, directions = np.linalg.eigh(related)
     known = values > least
     variance = (directions[:, known] ** 2 / values[known]).sum(axis=1) * (unit / scale) ** 2

@@ -41,7 +41,7 @@ from kfcourse.symbolic.reading import (
     shown,
     table,
 )
-from kfcourse.symbolic.sense import not_computable
+from kfcourse.symbolic.sense import check_computable
 from kfcourse.symbolic.typesetting import with_index
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
@@ -213,8 +213,7 @@ class Model:
             ("meter", self.meter_equation, self.w, self.meter_noise),
         ):
             means = dict(zip(noise, exact_matrix(noise_law.mean), strict=True))
-            if problem := not_computable(equation, self.values, means):
-                raise ModelError(f"the {what} equation {problem}")
+            check_computable(f"the {what} equation", equation, self.values, means)
 
     @property
     def n(self) -> int:

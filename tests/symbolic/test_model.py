@@ -72,7 +72,7 @@ def test_replaced_parameters_are_checked_as_those_defined():
     for equation, change in (("meter", {"r": -1}), ("state", {"c": 0})):
         with pytest.raises(
             ModelError,
-            match=f"the {equation} equation .* has no finite real value with these parameters",
+            match=f"the {equation} equation, .* with these parameters: no finite real value",
         ):
             model.replace(**change)
 
