@@ -196,14 +196,14 @@ ROOMS = {
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 21_230,
+    "kfcourse/lab": 21_210,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 10_420,
     "kfcourse/notebooks": 26_930,
     "kfcourse/pages": 10_520,
     "kfcourse/records": 6_230,
     "kfcourse/scenarios": 11_580,
-    "kfcourse/symbolic": 24_290,
+    "kfcourse/symbolic": 24_270,
     "tests": 224_760,
 }
 OF_LAYOUT = {

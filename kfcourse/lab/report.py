@@ -41,7 +41,6 @@ from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.writing import by_thousands
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "report.toml").read_text(encoding="utf-8"))
 LANGUAGES = tuple(WORDS)
@@ -104,9 +103,7 @@ def write_report(
             save_figure(partial(FIGURES[name], result, words=labels), place, name)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "modes")
-        save_texts(
-            ("report.html", "report.tex"), place, content, inline=inline_html, inline_tex=inline_tex
-        )
+        save_texts(("report.html", "report.tex"), place, content)
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -143,27 +140,20 @@ def save_figure(draw: Callable[[Axes], object], folder: Path, name: str) -> None
             figure.set_layout_engine("none")  # has been laid out
 
 
-def save_texts(
-    names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]
-) -> None:
-    """The files made from the templates NAME.j2; the templates may use further filters."""
+def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any]) -> None:
+    """The files made from the templates NAME.j2."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    own = {
-        "mathml": _mathml,
-        "tex": escape_tex,
-        "html": jinja2.filters.do_forceescape,
-        "thousands": by_thousands,
-    }
-    environment.filters |= own | filters
+    escape = jinja2.filters.do_forceescape
+    own = {"mathml": _mathml, "tex": escape_tex, "html": escape, "inline": inline_html}
+    environment.filters |= own | {"inline_tex": inline_tex}
     for name in names:
-        (folder / name).write_text(
-            environment.get_template(name + ".j2").render(content), encoding="utf-8"
-        )
+        text = environment.get_template(name + ".j2").render(content)
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:

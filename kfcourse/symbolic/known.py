@@ -16,10 +16,9 @@ import sympy as sp
 
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import Compiled, compile_function
-from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
     ModelError,
-    checked_name,
     exact_number,
     of_numbers,
     read,
@@ -55,7 +54,7 @@ class Known:
                 f"the interval between two steps must be positive, got {shown(interval)}"
             )
         values = {
-            checked_name(name): _sequence(name, given)
+            check_name(name): _sequence(name, given)
             for name, given in table("inputs", inputs).items()
         }
         return cls((), length, values)

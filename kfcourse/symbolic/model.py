@@ -24,14 +24,13 @@ import sympy as sp
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees, warn_of_meters
-from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
     Names,
     by_name,
-    checked_name,
     exact_matrix,
     exact_number,
     formula_list,
@@ -150,7 +149,7 @@ class Model:
         """
         given = table("parameters", parameters)
         values = {
-            checked_name(name): exact_number(f"parameter {name}", value)
+            check_name(name): exact_number(f"parameter {name}", value)
             for name, value in given.items()
         }
         a, b, known = (
@@ -384,7 +383,7 @@ def _symbols(
                 if re.fullmatch(key + r"[1-9][0-9]?", name)
             ]
             names = [f"{key}{i + 1}" for i in range(max(numbers))] if numbers else [key]
-        result[key] = [checked_name(name) for name in names]
+        result[key] = [check_name(name) for name in names]
     every = [name for names in result.values() for name in names] + [*values]
     twice = sorted({name for name in every if every.count(name) > 1})
     if twice:

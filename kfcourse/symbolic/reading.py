@@ -15,7 +15,7 @@ import sympy as sp
 
 from kfcourse.errors import ModelError
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.formula import check_name, parse
+from kfcourse.symbolic.formula import parse
 from kfcourse.symbolic.sense import is_covariance
 
 Formula: TypeAlias = str | sp.Expr
@@ -45,14 +45,6 @@ def table(what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
     if not isinstance(given, Mapping):
         raise ModelError(f"`{what}` must be a table such as {{'name': value}}, got {shown(given)}")
     return dict(given)
-
-
-def checked_name(name: str) -> str:
-    """The name, if a symbol may have it."""
-    try:
-        return check_name(name)
-    except ValueError as error:
-        raise ModelError(str(error)) from None
 
 
 def exact_number(what: str, value: Any) -> sp.Rational:
