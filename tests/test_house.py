@@ -196,7 +196,7 @@ ROOMS = {
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 21_210,
+    "kfcourse/lab": 21_200,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 10_420,
     "kfcourse/notebooks": 26_930,
