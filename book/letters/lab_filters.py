@@ -265,6 +265,7 @@ SAID = {
         r"n=\operatorname{line}(x_{k+1}\mid s_{k+1})",
     ],
     NOTATION: [
+        r"\mathsf{M}(x-z)^2",
         r"m^-=\mathrm E f",
         r"P^-=\mathrm{Cov}f+Q",
         r"\mathsf{D}\sigma",
