@@ -191,7 +191,7 @@ ROOMS = {
     "benchmarks": 6_180,
     "book": 50_230,
     "exercises": 40_150,
-    "kfcourse/*.py": 6_520,
+    "kfcourse/*.py": 6_500,
     "kfcourse/checks": 20_300,
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 14_930,
@@ -200,11 +200,11 @@ ROOMS = {
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 10_420,
     "kfcourse/notebooks": 26_930,
-    "kfcourse/pages": 10_520,
+    "kfcourse/pages": 10_140,
     "kfcourse/records": 6_230,
     "kfcourse/scenarios": 11_580,
     "kfcourse/symbolic": 24_270,
-    "tests": 224_760,
+    "tests": 224_710,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
