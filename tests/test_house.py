@@ -201,7 +201,7 @@ ROOMS = {
     "kfcourse/montecarlo": 10_420,
     "kfcourse/notebooks": 26_930,
     "kfcourse/pages": 10_140,
-    "kfcourse/records": 6_230,
+    "kfcourse/records": 6_250,
     "kfcourse/scenarios": 11_580,
     "kfcourse/symbolic": 24_270,
     "tests": 224_710,
