@@ -35,7 +35,15 @@ from kfcourse.lab.report import (
     write_json,
     write_report,
 )
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_exact, title
+from kfcourse.lab.short_names import (
+    FILTERS,
+    JUMP_FILTERS,
+    JUMP_LAB,
+    LAB,
+    has_exact,
+    judging,
+    title,
+)
 from kfcourse.lab.variants import RUNS as CHECKED
 from kfcourse.lab.variants import STEPS, find_variant, read_tables, read_variants, summary
 from kfcourse.montecarlo import FEWEST
@@ -181,6 +189,11 @@ def main() -> None:
     help="Language of the report.",
 )
 @click.option(
+    "--scores",
+    is_flag=True,
+    help="Also judge each filter's prediction of the measurement, doubt and all: log score, CRPS.",
+)
+@click.option(
     "--json",
     "json_file",
     type=click.Path(path_type=Path),
@@ -199,6 +212,7 @@ def lab(
     dask: str | None,
     out: Path | None,
     language: str,
+    scores: bool,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
@@ -249,6 +263,7 @@ def lab(
         seed,
         left_out=refused,
         same_ensemble=same_ensemble,
+        scores=judging(model) if scores else None,
         jobs=jobs,
         dask=dask,
     )
@@ -283,6 +298,13 @@ def _tell(result: Comparison, to_error: bool) -> None:
     for name, gap in result.ranking():
         found = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else found}")
+    if result.scored:
+        lines.append("Predictions of the measurement, mean over the steps ± standard error:")
+        lines.append(f"{'':<18} {'log score':>19} {'CRPS':>19}")
+    for name in result.names if result.scored else ():
+        both = [score(name, steps=slice(None)) for score in (result.log_score, result.crps)]
+        shown = [f"{float(one.value):10.4f} ± {float(one.standard_error):.4f}" for one in both]
+        lines.append(f"{title(name):<18} {shown[0]:>19} {shown[1].replace('nan ± nan', '-'):>19}")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 

@@ -658,4 +658,9 @@ def test_the_command_ranks_the_filters_of_such_a_variant(tmp_path, monkeypatch):
         main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"]
     )
     assert done.exit_code == 0 and "LAOF" in done.stdout and "No report" in done.stderr
+    assert "log score" not in done.stdout
+    command = ["lab", "mine", "--variants", "my.toml", "--runs", "128", "--steps", "2", "--scores"]
+    done = CliRunner().invoke(main, [*command, "--filters", "aof-exact,aof-linearised"])
+    scores = done.stdout.split("CRPS\n")[1].splitlines()
+    assert [line.split()[-1] == "-" for line in scores] == [True, False]  # its law is not normal
     assert Path("numbers.json").exists() and not Path("lab-mine").exists()
