@@ -242,10 +242,8 @@ def _integrated(
             z.reshape(-1, 1, n), np.broadcast_to(p, square).reshape(-1, 1, n, n), strict=True
         )
         parts = [_integrated(rates, now, span, *law, accuracy) for law in each]
-        return tuple(
-            np.concatenate(part).reshape(*lead, *part[0].shape[1:])
-            for part in zip(*parts, strict=True)
-        )
+        mean, F, Q = map(np.concatenate, zip(*parts, strict=True))
+        return mean.reshape(z.shape), F.reshape(square), Q.reshape(square)
     return unpacked(_implicit(rate, start, span, accuracy) if done is None else done)
 
 
