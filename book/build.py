@@ -30,7 +30,12 @@ CACHE = BUILD / ".jupyter_cache"
 KEPT = (CACHE, sample.FOLDER, BUILD / "solutions")  # made anew by themselves when stale
 KEY = BUILD / ".executed-with"
 SOURCES = ("_config.yml", "requirements.txt", "book", "exercises", "kfcourse")
-MADE = ("book/manual", "book/package", "book/equations.md")  # by the build
+MADE = (
+    "book/manual",
+    "book/package",
+    "book/equations.md",
+    "book/equations-beyond.md",
+)  # by the build
 BUILT = BUILD / ".built-from"
 PAGE = BUILD / "html" / "index.html"
 NOT_BUILT = "\nThe book was NOT built: see the errors and warnings above."
@@ -100,10 +105,9 @@ def main() -> int:
     package.write()
     sample.write()
     made = chapters.executed(CACHE)
-    equations.PAGE.write_text(
-        equations.page((name, equations.records(notebook)) for name, notebook in made),
-        encoding="utf-8",
-    )
+    listed = equations.pages((name, equations.records(notebook)) for name, notebook in made)
+    for name, text in listed.items():
+        (ROOT / "book" / f"{name}.md").write_text(text, encoding="utf-8")
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
     options = ["--config", "_config.yml", "--path-output", ".", "-W", "--keep-going", "-n"]
     result = subprocess.run([*jupyter_book, "build", "book", *options], cwd=ROOT)

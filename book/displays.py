@@ -12,7 +12,7 @@ from collections import Counter
 from pathlib import Path
 
 from docutils import nodes
-from equations import PAGE
+from equations import BEYOND, COURSE
 from gate.page import Formula, Letters, Said, letters_file, letters_of, mark
 from sphinx.util import logging
 
@@ -25,8 +25,8 @@ log = logging.getLogger(__name__)
 def say(app, doctree) -> None:
     """Put the words where the reader looks for them."""
     page = Path(app.srcdir, f"{app.env.docname}.md")
-    # says so itself; is given by a task, for any variant
-    if page == PAGE or app.env.docname.startswith("manual/"):
+    # say so themselves; is given by a task, for any variant
+    if page.stem in (COURSE, BEYOND) or app.env.docname.startswith("manual/"):
         return
     letters = letters_of(page)
     app.env.note_dependency(str(letters_file(page)))

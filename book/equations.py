@@ -1,4 +1,4 @@
-"""The page of all displayed equations, each with what it is.
+"""The pages of all displayed equations, the course's and those beyond, each with what it is.
 
 `verified` and `typeset` (kfcourse.pages) leave a record beside each equation that they print:
 LaTeX, how it was verified or what it is, its label.  Equations that a chapter types are judged with
@@ -11,11 +11,13 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
+import yaml
 from gate.page import judged, mark
 
 from kfcourse.pages.verification import VERIFIED
 
-PAGE = Path(__file__).resolve().parent / "equations.md"
+BOOK = Path(__file__).resolve().parent
+COURSE, BEYOND = "equations", "equations-beyond"
 HEAD = """\
 (all-equations)=
 # All equations
@@ -27,9 +29,16 @@ by a plain program, and *both sides computed*. If one of these did not hold, the
 The others are definitions, quotations, and statements without proof; they stand here letter by
 letter, and a changed letter stops the build, but nothing shows that they are true.
 
-{total} equations in {chapters} chapters were verified by SymPy, {computed} typed
+In the whole book {total} equations in {chapters} chapters were verified by SymPy, {computed} typed
 relations computed, {others} are said to be something else; {claims} statements in words had their
-conditions evaluated.
+conditions evaluated. Here are those of the course; {{doc}}`equations-beyond` has the others.
+
+"""
+HEAD_BEYOND = """\
+# Equations beyond the course
+
+{{doc}}`equations` says what stands beside each of them.
+
 """
 
 
@@ -39,11 +48,19 @@ def records(notebook) -> list[dict]:
     return [output["data"][VERIFIED] for output in outputs if VERIFIED in output.get("data", {})]
 
 
-def page(chapters: Iterable[tuple[str, list[dict]]]) -> str:
-    """The page in Markdown, from pairs (document, records)."""
-    parts, counted = [], Counter()
+def page_of(document: str) -> str:
+    """The page that has a chapter's equations."""
+    toc = yaml.safe_load((BOOK / "_toc.yml").read_text(encoding="utf-8"))
+    (beyond,) = (part for part in toc["parts"] if part.get("caption") == "Beyond the course")
+    return BEYOND if document in (page["file"] for page in beyond["chapters"]) else COURSE
+
+
+def pages(chapters: Iterable[tuple[str, list[dict]]]) -> dict[str, str]:
+    """The pages in Markdown by name, from pairs (document, records)."""
+    parts: dict[str, list[str]] = {COURSE: [], BEYOND: []}
+    counted: Counter = Counter()
     for document, made in chapters:
-        typed = list(judged(PAGE.parent / f"{document}.md"))
+        typed = list(judged(BOOK / f"{document}.md"))
         relations = [
             one for formula, said in typed if formula.kind in ("display", "box") for one in said
         ]
@@ -66,30 +83,22 @@ def page(chapters: Iterable[tuple[str, list[dict]]]) -> str:
             if formula.kind == "display" and said
         ]
         if shown:
-            parts += [
+            parts[page_of(document)] += [
                 f"({place_of(document)})=\n## {_title(document)}\n\n{_count(here)}: "
                 f"{{doc}}`{document}`\n",
                 *shown,
             ]
-    return (
-        HEAD.format(
-            **{
-                name: counted[name]
-                for name in ("total", "chapters", "computed", "others", "claims")
-            }
-        )
-        + "\n"
-        + "\n".join(parts)
-    )
+    heads = {COURSE: HEAD, BEYOND: HEAD_BEYOND}
+    return {name: heads[name].format_map(counted) + "\n".join(parts[name]) for name in parts}
 
 
 def place_of(document: str) -> str:
-    """Where a chapter's equations stand on the page."""
+    """Where a chapter's equations stand on their page."""
     return f"equations-of-{document}"
 
 
 def _title(document: str) -> str:
-    text = (PAGE.parent / f"{document}.md").read_text(encoding="utf-8")
+    text = (BOOK / f"{document}.md").read_text(encoding="utf-8")
     return next(line[2:] for line in text.splitlines() if line.startswith("# "))
 
 

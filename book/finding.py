@@ -15,11 +15,11 @@ from pathlib import Path
 
 import contents
 from docutils import nodes
+from equations import BEYOND, COURSE
 from sphinx import addnodes
 
 # not in _static, whose scripts every page loads
 SCRIPTS = Path(__file__).resolve().parent / "search"
-REPEATS = "equations"  # the page that repeats those of the others
 SILENT = (
     nodes.raw,
     nodes.math_block,
@@ -38,7 +38,7 @@ READABLE = re.compile(r"[\w+=-]{1,3}|[a-z]_[0-9k]|[a-z]_\{(k [+-] 1)\}")  # with
 def collect(app, doctree, name: str) -> None:
     """Address, titles of page and section, and text of each section of a page, of the first without
     a title; and of each term."""
-    if name == REPEATS:
+    if name in (COURSE, BEYOND):  # repeat what stands on other pages
         return
     known = contents.page(app.env, name)
     page = known[1].title if known else app.env.titles[name].astext()

@@ -23,7 +23,7 @@ import nbformat
 from docutils import nodes
 from docutils.parsers.rst import directives
 from downloads import plain
-from equations import PAGE, place_of, records
+from equations import page_of, place_of, records
 from sphinx import addnodes
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
@@ -92,7 +92,7 @@ def _items(app, name: str, line: chapter_line):
         notebook = nbformat.read(executed, as_version=4)
         yield embedded(f"{name}.ipynb", nbformat.writes(plain(notebook)).encode(), "↓ notebook")
         count = sum(one["equations"] for one in records(notebook))
-        place = f"{app.builder.get_relative_uri(name, PAGE.stem)}#{place_of(name)}"
+        place = f"{app.builder.get_relative_uri(name, page_of(name))}#{place_of(name)}"
         yield (
             count
             and f'<a class="kf-count" href="{place}">✓ {count} equation{"s" * (count > 1)} '

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-MOVED: dict[str, str] = {}
+MOVED = {
+    "checking-exact": "comparison",
+    "derive-it": "live-lab",
+    "extended-kalman": "linearisation",
+    "lecture-continuous": "continuous",
+}
 
 
 def pages(app) -> Iterator[tuple[str, dict[str, str], str]]:

@@ -16,8 +16,9 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from bs4 import BeautifulSoup
+from equations import BEYOND, COURSE
 
-REPEATS = "equations.html"  # shows what it refers to
+REPEAT = tuple(f"{name}.html" for name in (COURSE, BEYOND))  # show what they refer to
 LINK = re.compile(r'<a [^>]*class="[^"]*\breference internal\b[^"]*"[^>]*>')
 PLACE = re.compile(r'href="([^"#]+\.html)#([^"]+)"')
 
@@ -31,7 +32,7 @@ def write(app, exception: Exception | None) -> None:
     for path in sorted(root.rglob("*.html")):
         name, text = path.relative_to(root).as_posix(), path.read_text(encoding="utf-8")
         here, found = posixpath.dirname(name) or ".", {}
-        for place in (PLACE.search(link[0]) for link in LINK.finditer(text) if name != REPEATS):
+        for place in (PLACE.search(link[0]) for link in LINK.finditer(text) if name not in REPEAT):
             target = place and posixpath.normpath(posixpath.join(here, place[1]))
             if not target or not (root / target).exists():
                 continue

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import contents
 from docutils import nodes
+from equations import BEYOND, COURSE
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.docutils import SphinxDirective
 
@@ -142,7 +143,7 @@ class FirstUses(SphinxPostTransform):
 
     def run(self, **kwargs) -> None:
         page = self.env.docname
-        without = (PAGE, "equations", "references", self.config.root_doc)
+        without = (PAGE, COURSE, BEYOND, "references", self.config.root_doc)
         if page in without or page.startswith(("package/", "api")):
             return
         own = [term for term in terms() if term.page == page]

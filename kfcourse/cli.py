@@ -40,6 +40,7 @@ from kfcourse.lab.short_names import (
     JUMP_FILTERS,
     JUMP_LAB,
     LAB,
+    check_names,
     has_exact,
     judging,
     title,
@@ -222,8 +223,9 @@ def lab(
     """
     chosen = find_variant(variant, variants_file)
     model = chosen.model
+    jumps = isinstance(model, JumpModel)
+    entries, usual = (JUMP_FILTERS, JUMP_LAB) if jumps else (FILTERS, LAB)
     if names is None:
-        usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
         bound = bound or has_exact(model)
         wanted = [*usual, EXACT] if bound else list(usual)
         if not bound:
@@ -233,40 +235,32 @@ def lab(
                 err=True,
             )
     else:
-        wanted = [name.strip() for name in names.split(",") if name.strip()]
-    found = admissions(model, wanted, DERIVATION)
-    refused = {one.name: one.reason for one in found if one.built is None}
-    for one in found:
-        for warning in one.warnings:
-            click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
-    entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
-    of_functions = [
-        one for one in found if entries[one.name].functions in ("gaussian", "best", "averaged")
-    ]
-    for remark in dict.fromkeys(remark for one in of_functions for remark in one.remarks):
-        whose = ", ".join(title(one.name) for one in of_functions if remark in one.remarks)
-        click.echo(f"{whose}: {remark}", err=True)
-    if len(refused) == len(found):
-        raise click.ClickException(
-            "; ".join(f"{name}: {reason}" for name, reason in refused.items())
-            or "give at least one filter: --filters duof,aof-gaussian"
-        )
+        wanted = _names(names)
+    check_names(wanted, entries)
+    known = {answer.name: answer for answer in admissions(model, seconds=DERIVATION)}
+    answers = [known[name] for name in dict.fromkeys(wanted)]
+    refused = {answer.name: answer.reason for answer in answers if answer.built is None}
+    remarks: dict[str, list[str]] = {}
+    for answer in answers:
+        for warning in answer.warnings:
+            click.echo(f"Warning: {title(answer.name)}: {warning}", err=True)
+        if entries[answer.name].functions in ("gaussian", "best", "averaged"):
+            for remark in answer.remarks:
+                remarks.setdefault(remark, []).append(title(answer.name))
+    for remark, titles in remarks.items():
+        click.echo(f"{', '.join(titles)}: {remark}", err=True)
+    if len(refused) == len(answers):
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
+        raise click.ClickException(reasons or "give at least one filter: --filters duof")
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    filters = [one.built for one in found if one.built]
+    filters = [answer.built for answer in answers if answer.built]
     result = without_failing(
-        filters,
-        model,
-        runs,
-        steps or chosen.steps,
-        seed,
-        left_out=refused,
-        same_ensemble=same_ensemble,
+        filters, model, runs, steps or chosen.steps, seed,
+        left_out=refused, same_ensemble=same_ensemble, jobs=jobs, dask=dask,
         scores=judging(model) if scores else None,
-        jobs=jobs,
-        dask=dask,
-    )
+    )  # fmt: skip
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
     to_error = str(json_file) in STANDARD_OUTPUT
@@ -281,9 +275,7 @@ def lab(
         return
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
-        write_report(
-            chosen, result, place, language, admissions(model, None, DERIVATION, found), modes
-        )
+        write_report(chosen, result, place, language, [*known.values()], modes)
     click.echo(
         f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""),
         err=to_error,
@@ -296,14 +288,14 @@ def _tell(result: Comparison, to_error: bool) -> None:
         f"D_k above that of {title(result.reference)}, %, mean over the steps ± standard error:"
     ]
     for name, gap in result.ranking():
-        found = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
-        lines.append(f"{title(name):<18} {'diverges' if name in result.lost else found}")
+        size = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
+        lines.append(f"{title(name):<18} {'diverges' if name in result.lost else size}")
     if result.scored:
         lines.append("Predictions of the measurement, mean over the steps ± standard error:")
         lines.append(f"{'':<18} {'log score':>19} {'CRPS':>19}")
     for name in result.names if result.scored else ():
         both = [score(name, steps=slice(None)) for score in (result.log_score, result.crps)]
-        shown = [f"{float(one.value):10.4f} ± {float(one.standard_error):.4f}" for one in both]
+        shown = [f"{float(mean.value):10.4f} ± {float(mean.standard_error):.4f}" for mean in both]
         lines.append(f"{title(name):<18} {shown[0]:>19} {shown[1].replace('nan ± nan', '-'):>19}")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
@@ -331,9 +323,8 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
     if len(places) > 2 or (len(places) == 2 and variants_file):
         raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
     chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
-    found = admissions(chosen.model, seconds=DERIVATION)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
-    click.echo(table_of_filters(found))
+    click.echo(table_of_filters(admissions(chosen.model, seconds=DERIVATION)))
 
 
 @main.command()
@@ -402,11 +393,11 @@ def variants(
     chosen, faults = read_variants(variants_file, names)
     good = not faults
     if check and chosen:
-        found = list(
+        qualities = list(
             quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed, dask)
         )
-        click.echo(quality.table(found))
-        good &= all(one.well_posed for one in found)
+        click.echo(quality.table(qualities))
+        good &= all(examined.well_posed for examined in qualities)
     else:
         for variant in chosen.values():
             click.echo(summary(variant.name, variant.table))
@@ -421,23 +412,21 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
         raise click.ClickException(
             f"the variants cannot go to {out}: name a new file in an existing folder with --out"
         )
-    found = grammar.generate(wanted, seed, runs, jobs, unposed)
-    reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
-    click.echo(
-        f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True
-    )
-    if found.variants:
+    generated = grammar.generate(wanted, seed, runs, jobs, unposed)
+    reasons = ", ".join(f"{number} {reason}" for reason, number in generated.rejected.most_common())
+    click.echo(f"{generated.rejected.total()} candidates rejected: {reasons}", err=True)
+    if generated.variants:
         text = (
             f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs "
-            f"{runs}\n\n{found.toml()}"
+            f"{runs}\n\n{generated.toml()}"
         )
         if out:
             save(text, out)
         else:
             click.echo(text, nl=False)
-    if len(found.variants) < wanted:
+    if len(generated.variants) < wanted:
         raise click.ClickException(
-            f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try "
+            f"only {len(generated.variants)} of {wanted} variants found; ask for fewer, or try "
             f"another --seed"
         )
 
@@ -582,13 +571,13 @@ def estimate(
         )
     _check_places(folder, None)  # before the long part
     click.echo(f"Model {variant.name}: {variant.title or variant.model}", err=True)
-    told = estimate_record(
+    result = estimate_record(
         file, variant, columns=columns, structure=structure, gate=gate, by_component=by_component,
         unknown=_names(unknown), positive=_names(positive),
     )  # fmt: skip
-    click.echo("\n".join(told.says()))
+    click.echo("\n".join(result.says()))
     with _kept(folder), replacing_together(folder) as place:
-        write_record(told, place, drawn)
+        write_record(result, place, drawn)
     click.echo(f"Report: {folder / 'report.html'}; numbers: {folder / 'estimate.csv'}")
 
 

@@ -1,11 +1,11 @@
 r"""Plants changes in the relations that the book displays, and counts what nothing notices.
 
     cd book
-    python -m gate.plant
-        each typed relation of each page, changed in each way it can be: by chapter and kind
+    python -m gate.plant                each typed relation of each page, changed in each way it can
+                                        be: by chapter and kind
     python -m gate.plant --seed 7       other places of the changes
-    python -m gate.plant --checked 20
-        and changes in 20 checked expressions, for which cells are executed
+    python -m gate.plant --checked 20   and changes in 20 checked expressions, for which cells are
+                                        executed
     python -m gate.plant grid --show    one chapter, and each change that nothing noticed
 
 A change is a sign, a factor, an index, or a transposition.  It is noticed if the relation no longer

@@ -6,16 +6,18 @@ A world is a text whose lines are done one after another::
     \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num,
                                        nums n [plain], share n (they sum to one), list n any m
     k: range 0 4                       an index that runs
-    x: nodes \lambda \Psi   nodes of a normal law, and the operators \mathsf M and \mathsf D over it
+    x: nodes \lambda \Psi              nodes of a normal law, and the operators \mathsf M and
+                                       \mathsf D over it
     K = \Psi G^T(G\Psi G^T+R)^{-1}      define, of letters that stand above
     f(x) = \sin x                      define a function
-    \Psi_{k+1} = Ap_kA^T+Q
-        lines with an index follow each other for k = 0, 1, ...; \Psi_0 = P begins
+    \Psi_{k+1} = Ap_kA^T+Q             lines with an index follow each other for k = 0, 1, ...;
+                                       \Psi_0 = P begins
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
-    again:   what follows, down to `then:`, again and again until nothing changes
+    again:                             what follows, down to `then:`, again and again until nothing
+                                       changes
     keep: K, p                         forget all other letters; `forget: a, b` these
-    "|v|" = \sqrt{v^Tv}
-        a letter that looks like something else; `"p(x|z)" of x = ...` moves with x
+    "|v|" = \sqrt{v^Tv}                a letter that looks like something else; `"p(x|z)" of x =
+                                       ...` moves with x
 
 A page's relation must hold in a world with all its letters, so a world says things in another way
 than the page: an inverse for a gain, a sum or an integral for a closed form.

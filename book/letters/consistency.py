@@ -1,9 +1,9 @@
 """The letters of consistency.md: a run of the package's Kalman filter, in both notations."""
 
 import numpy as np
-from gate.page import CONDITION, NOTATION
+from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed
-from gate.worlds import kalman_run
+from gate.worlds import covariance, kalman_run
 
 
 def course(rng):
@@ -54,16 +54,47 @@ keep: K, P, F, p_f, c, \mathrm{NEES}
 """
 
 
-LETTERS = (course, western, constant_gain)
+def spread(cov):
+    """Points with equal weights whose mean is zero and whose covariance is `cov`."""
+    root = np.linalg.cholesky(len(cov) * cov)
+    return [sign * root[:, [i]] for i in range(len(cov)) for sign in (1, -1)]
+
+
+def of_points(rng):
+    """Means over points that have the covariances of the normal laws."""
+    p, P, K, H = covariance(rng, 2), covariance(rng, 3), rng.normal(size=(2, 1)), rng.normal(size=2)
+    Phi, one = rng.normal(size=(2, 2)), covariance(rng, 2)
+    H = H[None]
+    joint = np.block([[P[:2, :2], np.zeros((2, 1))], [np.zeros((1, 2)), P[2:, 2:]]])
+    pairs = []
+    for point in spread(joint):
+        e, n = point[:2], point[2:]
+        nu = H @ e + n
+        pairs.append(((H @ Phi @ (e - K @ nu)) * nu, nu * nu, e * nu))
+    product, F, gain = (np.mean(values, axis=0) for values in zip(*pairs, strict=True))
+    nees = [e.T @ np.linalg.solve(p, e) for e in spread(one)]
+    traces = [np.trace(np.linalg.solve(p, e @ e.T)) for e in spread(one)]
+    means = {
+        r"\mathsf M(e^Tp^{-1}e)": np.mean(nees),
+        r"\mathsf M\operatorname{tr}(p^{-1}ee^T)": np.mean(traces),
+        r"\mathsf M(\nu_{k+1}\nu_k)": product.item(),
+    }
+    known = {"p": p, "P": one, "H": H, r"\Phi": Phi, "K": K, "F": F.item(), "K_*": gain / F}
+    return known | means | {r"\operatorname{tr}": np.trace}
+
+
+LETTERS = (course, western, constant_gain, of_points)
 SAID = {
     NOTATION: [
         r"\chi^2_{N\dim x}/N",
         "Q/R",
         r"\mathsf P(e^Tp^{-1}e<\rho^2)",
-        r"\mathsf M(e^Tp^{-1}e)\big|_{P=p}",
-        r"\mathsf M(\nu_{k+1}\nu_k)",
-        r"\mathsf{M}(e^Tp^{-1}e)",
         r"\operatorname{tr}(p^{-1}P)",
+    ],
+    DEFINITION: [
+        r"x_{k+1}=0.95\,x_k+0.3\,v_k",
+        "y_k=x_k+w_k",
+        r"x_0\sim\mathcal N\Bigl(0,\frac{0.3^2}{1-0.95^2}\Bigr)",
     ],
     CONDITION: [r"H\Phi K>0"],
 }

@@ -3,7 +3,7 @@ are mixed."""
 
 import numpy as np
 import sympy as sp
-from gate.page import DEFINITION, NOTATION
+from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed
 from gate.worlds import column, covariance, slope
 from scipy.linalg import expm
@@ -180,15 +180,6 @@ def stationary(rng):
     }
 
 
-walk = r"""
-q, r: pos
-D = \sqrt{qr}/r
-D_{4N} = \sqrt{4q/r}
-T = q
-N = r
-"""
-
-
 def short_step(rng):
     """The prediction of the package's discrete filter, and its next covariance by a solver."""
     own, T = model(rng), 0.07
@@ -204,134 +195,214 @@ def short_step(rng):
         "H": letters["H"],
         "g": letters["g"],
         "I": np.eye(2),
+        r"S_\xi": letters[r"S_\xi"],
     }
     after = {r"\lambda": column(law.mean), r"\Psi": Psi, "f": f(letters["z"]), "T": T, "B": B}
     return names | after | {r"D_\xi": steps.state_noise.cov, "D_n": D_n}
 
 
-def riccati(a, q, r, start):
-    """D(t) of the scalar equation, as the quotient of two solutions of a linear one; `start` is a
-    quotient too."""
+def derivatives(rng):
+    """The package's rates with second derivatives; the gradient and the Hessian of F by complex
+    steps and differences."""
+    own = model(rng)
+    letters, f, S = rates(own, second_derivatives=True)
+    y, N = letters["y"], letters["N"]
+
+    def rate(x):
+        return np.linalg.solve(N, 2 * S(x)).T @ y - S(x).T @ np.linalg.solve(N, S(x))
+
+    def gradient(x):
+        return slope(S, x).T @ np.linalg.solve(N, 2 * (y - S(x)))
+
+    z, step = letters["z"], 1e-4
+    sides = [
+        [
+            gradient(z + sign * step * size * e[:, None])
+            for sign, size in ((1, 1), (-1, 1), (1, 2), (-1, 2))
+        ]
+        for e in np.eye(2)
+    ]
+    U = np.hstack([(8 * (a - b) - (c - d)) / (12 * step) for a, b, c, d in sides])  # fourth order
+    row = slope(rate, z)
+    found = {
+        "u": gradient(z),
+        "U": U,
+        r"\frac{\partial F}{\partial x}": row,
+        r"\partial F/\partial x": row,
+        r"\partial u/\partial x": U,
+    }
+    hessian = {
+        r"\frac{\partial}{\partial x}\Bigl(\frac{\partial F}{\partial x}\Bigr)^T": U,
+        r"\partial f/\partial x": letters["A"],
+    }
+    return letters | found | hessian | {"f": f(z)}
+
+
+def likelihood(rng):
+    own = model(rng)
+    letters, _, S = rates(own)
+    x, y, N = rng.normal(size=(2, 1)), letters["y"], letters["N"]
+    of_phase = {"S": lambda phi, t: S(C.T @ phi), "y": lambda t: y, "c": C}
+
+    def F(x, t):
+        """What is left of -(y - S)^T N^-1 (y - S) without its part in y alone."""
+        return y.T @ np.linalg.solve(N, y) - (y - S(x)).T @ np.linalg.solve(N, y - S(x))
+
+    return {"x": x, "t": 0.0, "N": N, "F": F} | of_phase
+
+
+sizes = r"""
+D, N, S'', s: pos
+S' = -s
+\varepsilon = \sqrt{(2DS''/N)^2N/2/(2DS'^2/N)}
+keep: D, S', S'', N, \varepsilon
+"""
+
+
+def short_gain(rng):
+    """The gain of the package's discrete filter, by a solver, and what the second derivative of F
+    leaves of a covariance, by differences of the exponent."""
+    own, T = model(rng), 0.07
+    letters, _, _ = rates(own)
+    steps = to_discrete(own, T)
+    law = linearised(steps).predict(letters["z"].T, letters["D"][None])
+    Psi, U, H, D_n = law.cov.reshape(2, 2), covariance(rng, 2), letters["H"], steps.meter_noise.cov
+    K = np.linalg.solve(H @ Psi @ H.T + D_n, H @ Psi).T
+
+    def exponent(e):
+        return T * e @ U @ e / 2 - e @ np.linalg.solve(Psi, e) / 2
+
+    # exact for a square
+    bend = [[exponent(a + b) - exponent(a) - exponent(b) for b in np.eye(2)] for a in np.eye(2)]
+    known = {name: letters[name] for name in ("H", "N", "I")}
+    return known | {r"\Psi": Psi, "K": K, "T": T, "U": U, "D_+": -np.linalg.inv(bend)}
+
+
+def linear_signal(rng):
+    """The second derivative of the log-likelihood's rate where the signal is linear, by the slopes
+    of its gradient."""
+    own = model(rng, ["x1 + 0.2*x2", "x2 - 0.3*x1"])
+    letters, _, S = rates(own)
+    y, N = letters["y"], letters["N"]
+    U = slope(lambda x: slope(S, letters["z"]).T @ np.linalg.solve(N, 2 * (y - S(x))), letters["z"])
+    return {"U": U, "H": letters["H"], "N": N}
+
+
+def ahead_of_data(rng):
+    """The covariance with the data and without them, both at one moment."""
+    letters, _, _ = rates(model(rng), second_derivatives=True)
+    letters |= derivatives(rng)
+    A, D, g = letters["A"], letters["D"], letters["g"]
+    above = D + covariance(rng, 2)
+    dot = A @ above + above @ A.T + g @ letters[r"S_\xi"] @ g.T / 2
+    return letters | {
+        r"\bar D": above,
+        r"\dot{\bar D}": dot,
+        "E": above - D,
+        r"\dot E": dot - letters[r"\dot D"],
+    }
+
+
+even_signal = r"""
+y: in -1 1
+N: in 1 2
+x: num
+w: nodes 0 0.5
+"\mathsf My" = \mathsf M\cos w
+g(u) = -2(y-\cos(u))\sin(u)/N
+h = 0.001
+U = (8(g(h)-g(-h))-(g(2h)-g(-2h)))/(12h)
+S = \cos x
+keep: y, N, U, S, x, \mathsf My
+"""
+
+
+def scalar(rng):
+    """D(t) of the scalar equation, as the quotient of two solutions of a linear one."""
+    a, q, r, D_0, t = *rng.uniform(0.5, 1, size=3), rng.uniform(2, 3), rng.uniform(0.1, 0.2)
     rates = np.array([[-a, q], [r, a]])
 
     def D(t):
-        above, below = expm(rates * t) @ start
+        above, below = expm(rates * t) @ [D_0, 1]
         return above / below
 
-    return {"a": a, "q": q, "r": r}, D
+    end, now, dot = D(60), D(t), D(t + 1e-20j).imag / 1e-20
+    delta = now - end
+    known = {"a": a, "q": q, "r": r, "D_0": D_0, "t": t, r"\rho": np.sqrt(a**2 + q * r)}
+    moved = {"D": now, r"\dot D": dot, r"\dot\delta": dot, "w": 1 / delta}
+    return (
+        known
+        | moved
+        | {
+            r"D_\infty": end,
+            r"\delta": delta,
+            r"\delta_0": D_0 - end,
+            r"\dot w": -dot / delta**2,
+        }
+    )
 
 
-forgetting = r"""
-a, q, r: pos
-\rho = \sqrt{a^2+qr}
-d: pos
-D_0 = d+200
-t: in .2 .5
-f(t) = (\cosh(\rho t)D_0+\sinh(\rho t)(q-aD_0)/\rho)/(\cosh(\rho t)+\sinh(\rho t)(rD_0+a)/\rho)
-h = 0.0005
-D = f(t)
-\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
-D_\infty = f(40)
-T = 1.01D_0/(2aD_0+rD_0^2-q)
-\delta_0 = D_0-D_\infty
-\delta(t) = f(t)-D_\infty
-keep: a, q, r, D, \dot D, D_\infty, \rho, t, T, \delta, \delta_0, D_0
-"""
+def forgotten(rng):
+    known = scalar(rng)
+    delta = known[r"\delta"]
+    return known | {r"\delta": lambda t: delta}
 
 
-forgotten = r"""
-a, q, r: pos
-\rho = \sqrt{a^2+qr}
-d: pos
-D_0 = d+200
-t: in .2 .5
-f(t) = (\cosh(\rho t)D_0+\sinh(\rho t)(q-aD_0)/\rho)/(\cosh(\rho t)+\sinh(\rho t)(rD_0+a)/\rho)
-h = 0.0005
-D = f(t)
-\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
-D_\infty = f(40)
-T = 1.01D_0/(2aD_0+rD_0^2-q)
-\delta_0 = D_0-D_\infty
-\delta = D-D_\infty
-\dot\delta = \dot D
-w = 1/\delta
-\dot w = -\dot D/\delta^2
-keep: a, q, r, D, \dot D, D_\infty, \rho, t, T, \delta, \delta_0, D_0, \dot\delta, w, \dot w
-"""
+def rate_of_likelihood(rng):
+    known = likelihood(rng)
+    x, t = known["x"], known["t"]
+    now = {"S": known["S"](known["c"] @ x, t), "y": known["y"](t), "F": known["F"](x, t)}
+    return now | {"N": known["N"], "T": 0.07}
 
 
-unknown_start = r"""
-q, r: pos
-n = \sqrt{qr}
-f(t) = \sqrt{q/r}\cosh(nt)/\sinh(nt)
-t = \ln(201)/(2n)
-h = 0.0005
-D = f(t)
-\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
-\theta = nt
-u(x) = \cosh(x)/\sinh(x)
-keep: q, r, D, \dot D, t, \theta, u
-"""
-
-
-unknown_start_now = r"""
-q, r: pos
-n = \sqrt{qr}
-f(t) = \sqrt{q/r}\cosh(nt)/\sinh(nt)
-t = \ln(201)/(2n)
-h = 0.0005
-D = f(t)
-\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
-\theta = nt
-u = D\sqrt{r/q}
-u' = \dot D\sqrt{r/q}/n
-keep: q, r, D, \dot D, t, \theta, u, u'
-"""
-
-
-from_infinity = r"""
-a, q, r: pos
-t: in .2 .5
-\rho = \sqrt{a^2+qr}
-f(t) = (\cosh(\rho t)-a\sinh(\rho t)/\rho)/(r\sinh(\rho t)/\rho)
-\delta_\infty = f(t)-f(40)
-keep: a, q, r, t, \rho, \delta_\infty
-"""
+def ranks(rng):
+    """A system that is seen and moved."""
+    A, mu = covariance(rng, 3), rng.uniform(1, 2)
+    known = {"A": A - 2 * np.eye(3), r"\mu": mu, "I": np.eye(3), "n": 3}
+    parts = {"H": rng.normal(size=(2, 3)), "G": rng.normal(size=(3, 2))}
+    return known | parts | {r"\operatorname{rank}": np.linalg.matrix_rank}
 
 
 LETTERS = (
     display,
+    rate_of_likelihood,
+    ranks,
     in_short,
     box,
     western,
     discretised,
     stationary,
-    walk,
     short_step,
-    forgetting,
+    short_gain,
+    scalar,
     forgotten,
-    unknown_start,
-    unknown_start_now,
-    from_infinity,
+    derivatives,
+    likelihood,
+    sizes,
+    linear_signal,
+    ahead_of_data,
+    even_signal,
 )
 SAID = {
     DEFINITION: [
+        r"\mathsf D\Bigl[\textstyle\frac1T\int_0^Tn\,dt\Bigr]"
+        r"=\frac1{T^2}\int_0^T\!\!\int_0^T\frac N2\delta(t-t')\,dt'dt",
+        r"q=s^2S_\xi/2",
+        "r=2h^2/N",
         r"\frac{dx}{dt}=f(x,t)+g(x,t)\,\xi(t)",
         "y(t)=S(cx,t)+n(t)",
         r"x(0)\sim\mathcal N(m,d)",
+        r"\dot x=-\tfrac12x+\xi",
+        "y=x+n",
+        r"\dot x=-x+\xi",
+        r"y=x+\tfrac12\kappa x^2+n",
         r"\text{intensity}=\text{two-sided density}=\tfrac12\,\text{one-sided density}=\tfrac N2 .",
-        r"q=s^2S_\xi/2",
-        "r=2h^2/N",
     ],
     NOTATION: [
-        r"\mathsf D\Bigl[\textstyle\frac1T\int_0^Tn\,dt\Bigr]",
         r"\mathsf M[\text{middle}]-\mathsf M[\text{beginning}]",
         r"{\textstyle\frac12}",
+        r"{\textstyle\sum_i\bigl[2N^{-1}(y-S)\bigr]_i\frac{\partial^2S_i}{\partial x^2}}",
+        "{(y-S)}",
     ],
-}
-EQUALS = {
-    r"N\cdot\frac1{2T}": r"\frac N{2T}",
-    r"D\big|_{a=0}": r"\sqrt{q/r}",
-    "D_{4N}": "2D",
-    r"2\rho/\bigl(r(e^{2\rho t}-1)\bigr)": r"\delta_\infty",
+    CONDITION: [r"|\mu|\ge1"],
 }

@@ -2,7 +2,7 @@
 characteristic of a carrier."""
 
 import numpy as np
-from gate.page import NOTATION
+from gate.page import DEFINITION, NOTATION
 from gate.values import Indexed, Of
 from gate.worlds import K_RANGE, column, covariance, given, slope
 
@@ -101,16 +101,39 @@ keep: p_{\varphi\varphi}, p_{\nu\varphi}, U, \Delta, \delta, a, T
 """
 
 
-LETTERS = (run, display, western, carrier, drifting)
+def log_likelihood(rng):
+    """Its slopes by complex steps, by the state and by what enters the signal."""
+    x, y, D_n = rng.normal(size=(3, 1)), rng.normal(size=(2, 1)), covariance(rng, 2)
+
+    def L(phi):
+        return -(y - S(phi)).T @ np.linalg.solve(D_n, y - S(phi)) / 2
+
+    slopes = {
+        r"\frac{\partial L}{\partial\varphi}": slope(L, C @ x),
+        r"\frac{\partial L}{\partial x}": slope(lambda x: L(C @ x), x),
+        r"\frac{\partial S}{\partial\varphi}": slope(S, C @ x),
+    }
+    known = {"L": L, r"\varphi": C @ x, "c": C, "x": x}
+    return slopes | known | {"D_n": D_n, "y": y, "S": S(C @ x)}
+
+
+products = r"""
+a, \Delta: num
+"""
+
+
+LETTERS = (run, display, western, carrier, drifting, log_likelihood, products)
 SAID = {
+    DEFINITION: [
+        r"\varphi_{k+1}=\varphi_k+T\nu_k+s_\varphi v_{1,k}",
+        r"\nu_{k+1}=\nu_k+s_\nu v_{2,k}",
+        r"y_k=A\cos\Bigl(\frac{2\pi k}N+\varphi_k\Bigr)+\sigma w_k",
+    ],
     NOTATION: [
-        r"\frac1p",
-        r"\frac{\partial\ln p(x\mid y)}{\partial x}\Big|_{\lambda}",
         r"\mathsf D[u]_\text{carrier}",
         r"\frac{d\,\mathsf M[u]}{d\Delta}\Big|_0",
         r"\mathsf D[u]",
         r"-\mathsf M\frac{\partial u}{\partial\varphi}",
-        r"\tfrac12\textstyle\sum_{k=0}^1\mathsf M[u]",
         r"\mathsf M[u]",
         "p_kc^T",
     ],

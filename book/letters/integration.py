@@ -100,6 +100,45 @@ def western_before(rng):
     return western(rng, after=False)
 
 
+def together(rng):
+    """Three axes with one matrix."""
+    noise, drift, p = 0.7, 0.3, covariance(rng, 3)
+    found = {r"\Psi": [], "K": [], "p": []}
+    for _ in range(5):
+        before = p + drift**2 * np.eye(3) if found["p"] else p
+        p = np.linalg.inv(np.linalg.inv(before) + np.eye(3) / noise**2)
+        for name, value in zip(found, (before, -p / noise**2, p), strict=True):
+            found[name].append(value)
+    letters = {name: Indexed(values) for name, values in found.items()}
+    return letters | {r"\sigma_n": noise, r"\sigma_\xi": drift, "I": np.eye(3), "k": K_RANGE}
+
+
+settled = r"""
+\sigma_\xi, \sigma_n: pos
+\Psi = 1
+again:
+\Psi = 1/(1/\Psi+1/\sigma_n^2)+\sigma_\xi^2
+then:
+p = \Psi-\sigma_\xi^2
+"""
+
+
+def stepping(rng):
+    """The motion between two readings, by a fine sum."""
+    T, s, V, eps, r = rng.uniform(0.5, 1, 5)
+    t = T / 2**12 * (np.arange(2**12) + 0.5)
+    return {
+        "T_a": T,
+        "s": s,
+        "V": V,
+        r"\varepsilon": eps,
+        r"y_{\mathrm{NR}}": r,
+        "s_k": s + np.mean(V + t * (r - eps)) * T,
+        "V_k": V + T * r - T * eps,
+        r"\varepsilon_k": eps,
+    }
+
+
 accelerometer = r"""
 T_a: in .5 1
 N = \begin{pmatrix}0&1&0\\0&0&-1\\0&0&0\end{pmatrix}
@@ -107,11 +146,6 @@ I: eye 3
 A = I+T_aN+T_a^2N^2/2
 H = \begin{pmatrix}1&0&0\end{pmatrix}
 keep: A, H, T_a
-"""
-
-
-failure = r"""
-t, q_b: in 1 2
 """
 
 
@@ -169,19 +203,6 @@ y_{\mathrm{SR}} = V+n
 """
 
 
-rare = r"""
-m = 3
-\sigma_\xi, \sigma_n: pos
-q = m\sigma_\xi^2
-R = \sigma_n^2/m
-\Psi = q
-again:
-\Psi = q+1/(1/\Psi+1/R)
-then:
-p = \Psi-q
-"""
-
-
 def lecture(rng):
     """The general gain, and the lecture's."""
     own = western(rng)
@@ -205,28 +226,26 @@ LETTERS = (
     western,
     western_before,
     accelerometer,
-    failure,
     best_border,
     low_pass,
     two_filters,
-    rare,
+    together,
+    settled,
+    stepping,
     lecture,
 )
 SAID = {
     DEFINITION: [
         r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}",
         r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}",
+        r"\varepsilon_k=\varepsilon_{k-1}+\xi_{k-1}",
     ],
-    NOTATION: ["p", r"S(\lambda)-S(\lambda+\delta)"],
-    CONDITION: [r"m=2\sigma_n/\sigma_\xi", r"\mathcal F+\mathcal G=1", r"\mathcal F=1-\mathcal G"],
+    NOTATION: ["p"],
+    CONDITION: [r"\mathcal F+\mathcal G=1", r"\mathcal F=1-\mathcal G"],
 }
 EQUALS = {
     r"\sqrt{\sigma_n/\sigma_\xi}": r"\sigma_n/\sqrt p",
     r"{\lim_{\sigma_\xi\to0}p/\sigma_\xi}": r"\sigma_n",
-    r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": r"-S'(\lambda)",
-    r"y_{\mathrm{SR}}-(y_{\mathrm{INS}}-\hat\varepsilon)": r"n-\varepsilon+\hat\varepsilon",
-    r"\hat V-V": r"\varepsilon-\hat\varepsilon",
     r"\delta z-H\,\delta\hat x^-": r"(\cdot)",
     r"\det\begin{pmatrix}H\\HA\\HA^2\end{pmatrix}": "-T_a^3",
-    r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": "q_bt^5/20",
 }

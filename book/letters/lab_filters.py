@@ -253,6 +253,9 @@ LETTERS = (
 )
 SAID = {
     DEFINITION: [
+        "x_{k+1}=cx_k+ex_kv_k",
+        "y_k=gx_k+fx_k^2w_k",
+        r"x_0\sim\mathcal N(m,d)",
         r"\lambda_0=m",
         r"\Psi_0=d",
         r"e_k=\operatorname{line}(x_k-\lambda_k\mid\omega_k)",
@@ -262,6 +265,7 @@ SAID = {
         r"n=\operatorname{line}(x_{k+1}\mid s_{k+1})",
     ],
     NOTATION: [
+        r"\mathsf{M}(x-z)^2",
         r"m^-=\mathrm E f",
         r"P^-=\mathrm{Cov}f+Q",
         r"\mathsf{D}\sigma",

@@ -1,74 +1,71 @@
-"""The letters of linearisation.md: runs of the package's extended filter of a scalar model, and of
-several states."""
+"""The letters of linearisation.md: runs of the package's extended filter of a scalar model and of
+vectors, and the same filter in Western letters."""
 
 from functools import partial
-from itertools import product
 
 import numpy as np
-from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Of, Operator
-from gate.worlds import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
-
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import linearised
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import BENT_LATER, BENT_SCALAR, BENT_SCALAR_LATER, extended_run, given, slope
+from scipy.stats import multivariate_normal
 
 
-class AtEstimate(np.ndarray):
-    """g at the estimate, with and without its argument."""
-
-    def __call__(self, z):
-        return np.asarray(self)
+def at_k(values):
+    return Of(lambda k: values[k], "k")
 
 
-def course(rng):
-    run = extended_run(rng, BENT_SCALAR_LATER)
-    H, Phi, g = (run[name].values for name in ("H", r"\Phi", "g"))
-    functions = Indexed([now.view(AtEstimate) for now in g])
-    others = {"S'": Of(lambda k: H[k], "k"), "f'": Of(lambda k: Phi[k], "k")}
-    others |= {"m_0": column(BENT_SCALAR_LATER.prior.mean), "D_0": BENT_SCALAR_LATER.prior.cov}
-    return run | others | {"g": functions}
+def _together(run, *names):
+    return zip(*(run[name].values for name in names), strict=True)
 
 
-def scalar(rng):
-    """Functions that stay the same, their slopes anywhere, and the noise of the object in both
-    notations."""
-    run = extended_run(rng, BENT_SCALAR)
-    at_k = {
-        letter: Of(lambda k, one=run[name].values: one[k], "k")
-        for letter, name in (("S'", "H"), ("f'", r"\Phi"))
-    }
-    g = run["g"].values
-    at_k |= {"g": Of(lambda k: g[k], "k"), "Q": Of(lambda k: g[k] ** 2 * run[r"D_\xi"], "k")}
+def scalar(rng, model=BENT_SCALAR):
+    """A run, with the slopes and the noise of the object at the step."""
+    run = extended_run(rng, model)
+    S = [run["S"].plain(lam) for lam in run[r"\lambda"].values]
+    now = {"S'": run["H"].values, "f'": run[r"\Phi"].values, "g": run["g"].values, "S": S}
+    off = [nu**2 / (H**2 * Psi + run["D_n"]) for nu, H, Psi in _together(run, r"\nu", "H", r"\Psi")]
+    at_any = {"x": Indexed(rng.normal(size=len(off))), "d": Indexed([-one / 2 for one in off])}
+    run |= at_any
     same = {f"{name}_k'": partial(slope, run[name].plain) for name in "Sf"}
-    return at_k | same | {name: run[name] for name in (r"\lambda", "z", r"D_\xi", "k")}
+    for matrix in ("H", r"\Phi", "I"):
+        del run[matrix]
+    return run | same | {name: at_k(values) for name, values in now.items()}
+
+
+def vector(rng):
+    run = extended_run(rng, BENT_LATER)
+    x, lam, Psi = rng.normal(size=(3, 1)), run[r"\lambda"].plain, run[r"\Psi"].plain
+    y, S, D_n, H = run["y"].plain, run["S"].plain, run["D_n"], run["H"].plain
+
+    def log_density(off, cov):
+        """Of a normal law, without its constant."""
+        law = multivariate_normal(cov=cov)
+        return law.logpdf(off.ravel()) - law.logpdf(np.zeros(len(off)))
+
+    def J(x):
+        return log_density(x - lam, Psi) + log_density(y - S(x), D_n)
+
+    return run | {"x": x, "J": J, "F": H @ Psi @ H.T + D_n}
 
 
 def western(rng):
-    run = extended_run(rng)
-    H, Phi, g = (run[name].values for name in ("H", r"\Phi", "g"))
-    at_k = {
-        "H": Of(lambda k: H[k], "k"),
-        r"\partial h/\partial x": Of(lambda k: H[k], "k"),
-        "F": Of(lambda k: Phi[k], "k"),
-        r"\partial f/\partial x": Of(lambda k: Phi[k], "k"),
-        "Q": Of(lambda k: g[k] @ run[r"D_\xi"] @ g[k].T, "k"),
-        "g": Of(lambda k: g[k], "k"),
+    own = extended_run(rng)
+    x, P = given(own[r"\lambda"], own["z"]), given(own[r"\Psi"], own["p"])
+    g, D_xi, H = own["g"].values, own[r"D_\xi"], own["H"].values
+    S = [
+        slope_ @ cov @ slope_.T + own["D_n"]
+        for slope_, cov in zip(H, own[r"\Psi"].values, strict=True)
+    ]
+    names = {"F": r"\Phi", "R": "D_n", "v": r"\nu", "z": "y"}
+    same = {name: own[name] for name in "KHIk"} | {name: own[old] for name, old in names.items()}
+    return same | {
+        r"\hat x": x,
+        "P": P,
+        "Q": Of(lambda k: g[k] @ D_xi @ g[k].T, "k"),
+        "S": Indexed(S),
+        "f": own["f"].plain,
+        "h": own["S"].plain,
     }
-    same = {
-        "K": run["K"],
-        "y": run["y"],
-        "m^-": run[r"\lambda"],
-        "m": run["z"],
-        "P^-": run[r"\Psi"],
-        "P": run["p"],
-        "R": run["D_n"],
-    }
-    return (
-        at_k
-        | same
-        | {"h": run["S"].plain, "f": run["f"].plain, "I": run["I"], "k": run["k"]}
-        | {n: run[n] for n in (r"D_\xi", "D_n")}
-    )
 
 
 even = r"""
@@ -81,57 +78,60 @@ k: range 3
 """
 
 
-def multiplied(rng):
-    """The package's filter without measurements, and the truth by all signs that the state and the
-    noises can have."""
-    c, e, m, p_0 = rng.uniform(0.85, 0.95), *rng.uniform(0.6, 0.8, size=3)
-    ahead = linearised(Model.define("c*x + e*x*v", "x + w", {"c": c, "e": e}))
-    signs = np.array(list(product((-1, 1), repeat=5)))
-    x, laws = [m + np.sqrt(p_0) * signs[:, 0]], [(np.array([[m]]), np.array([[[p_0]]]))]
-    for sign in signs.T[1:]:
-        x.append((c + e * sign) * x[-1])
-        laws.append(ahead.predict(*laws[-1]))
-    u = np.sqrt(p_0) * signs[:, 0]
-    return {
-        "c": c,
-        "e": e,
-        "m": m,
-        "p": Indexed([law[1].item() for law in laws], p_0),
-        "z": Indexed([law[0].item() for law in laws]),
-        "x": Indexed(x),
-        "u": u,
-        "V": Indexed([np.var(one) for one in x]),
-        r"\mathsf M": Operator(np.mean),
-        "k": range(4),
-    }
-
-
-exponent = r"""
-a: num
-c: pos
-b = -c
-n = \int e^{ax+bx^2}dx
-m_\text{e} = \int xe^{ax+bx^2}dx/n
-v_\text{e} = \int(x-m_\text{e})^2e^{ax+bx^2}dx/n
-keep: a, b, m_\text{e}, v_\text{e}
+averaged = r"""
+z: num
+p: in .00001 .00002
+u: nodes 0 p
+g = \sin z
+g' = \cos z
+g'' = -\sin z
 """
 
 
-LETTERS = (course, scalar, western, even, multiplied, exponent)
+pendulum = r"""
+x: num
+T = 0.2
+f = x-T\sin x
+g = \cos x
+S = \sin x
+"""
+
+
+meters = r"""
+p = 0.25
+S' = 6
+K = 0.15
+"""
+
+
+LETTERS = (
+    scalar,
+    partial(scalar, model=BENT_SCALAR_LATER),
+    vector,
+    western,
+    even,
+    averaged,
+    pendulum,
+    meters,
+)
 SAID = {
     DEFINITION: [
         r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
         "y_k=S_k(x_k)+n_k",
+        r"x_{k+1}=x_k-T\sin x_k+\cos x_k\,\xi_k",
+        r"y_k=\sin x_k+n_k",
+        r"x_0\sim\mathcal N(1,0.1)",
+        r"p(x_{k-1}\mid y_{0:k-1})=\mathcal N(x_{k-1};z_{k-1},p_{k-1})",
+        r"p(x_k\mid x_{k-1})=\mathcal N\bigl(x_k;f(x_{k-1}),g^2(x_{k-1})D_\xi\bigr)",
+        r"p(y_k\mid x_k)=\mathcal N\bigl(y_k;S(x_k),D_n\bigr)",
+        r"f(x_{k-1})\approx f+f'\cdot(x_{k-1}-z_{k-1})",
+        r"g^2(x_{k-1})\approx g^2",
+        r"S(x_k)\approx S+S'\cdot(x_k-\lambda_k)",
         "g=ex",
-        r"\ln p(x_{k-1}\mid y_{0:k-1})",
-        r"\ln p(x_k\mid x_{k-1})",
-        r"\ln p(y_k\mid x_k)",
+        "x=z+e",
+        "S=x^2",
+        "S(x)=x^2",
     ],
-    NOTATION: [
-        r"f_{k-1}(x_{k-1})-O\bigl((x_{k-1}-z_{k-1})^2\bigr)",
-        "g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
-        r"S_{k}(x_k)-O\bigl((x_k-\lambda_k)^2\bigr)",
-        r"\mathsf{M}\,g^2(z+u)-g^2(z)-O(p^2)",
-    ],
+    NOTATION: [r"\mathsf{M}\,g^2(z+u)-g^2(z)-O(p^2)"],
+    CONDITION: [r"\Psi^{-1}=0", "D_n=0"],
 }
-EQUALS = {"-1/(2b)": r"v_\text{e}", "-a/(2b)": r"m_\text{e}"}

@@ -2,7 +2,7 @@
 law."""
 
 import numpy as np
-from gate.page import NOTATION
+from gate.page import DEFINITION, NOTATION
 from numpy.polynomial.hermite_e import hermegauss
 from scipy.optimize import minimize_scalar
 
@@ -33,14 +33,6 @@ def best_line(rng):
 
 LETTERS = (best_line,)
 SAID = {
-    NOTATION: [
-        r"\lambda",
-        r"\Psi",
-        r"\varrho",
-        "1/K",
-        r"1/K\,\big|_{\Psi=\lambda^2/\sqrt3}",
-        r"\frac{\partial}{\partial\Psi}\frac1K\Big|_{\Psi=\lambda^2/\sqrt3}",
-        r"\mathsf D(e+d)^2",
-        r"\mathsf Dd^2",
-    ],
+    DEFINITION: ["x_{k+1}=cx_k+ex_kv_k", "y_k=gx_k+fx_k^2w_k"],
+    NOTATION: [r"\lambda", r"\Psi", "1/K", r"1/K\,\big|_{\Psi=\lambda^2/\sqrt3}"],
 }

@@ -1,14 +1,11 @@
-"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array,
-Bierman's loop."""
+"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Of
 from gate.worlds import column, covariance
 
 from kfcourse.filters.kalman import correct
 from kfcourse.laws import Gaussian
-from kfcourse.linear.factored import factors
 from kfcourse.linear.system import LinearSystem
 
 
@@ -77,61 +74,6 @@ def array(rng):
     }
 
 
-def loop(rng):
-    """Bierman's loop over the columns, column by column."""
-    found, n = _corrected(rng, 1), 3
-    unit, diagonal = factors(found[r"\Psi"])
-    h, r = found["H"].T, found["R"].item()
-    f = unit.T @ h
-    v = np.diag(diagonal) @ f
-    alpha, K, before, after, columns = [r], np.zeros((n, 1)), [None], [None], [None]
-    for j in range(n):
-        alpha.append(alpha[-1] + f[j, 0] * v[j, 0])
-        before.append(K)
-        columns.append(unit[:, [j]] - f[j, 0] / alpha[-2] * K)
-        K = K + v[j, 0] * unit[:, [j]]
-        after.append(K)
-    smaller = [None, *(diagonal * np.array(alpha[:-1]) / np.array(alpha[1:]))]
-    U, D = np.hstack(columns[1:]), np.diag(smaller[1:])
-    running = {
-        r"\alpha": Indexed(alpha),
-        "n": n,
-        "j": range(1, n + 1),
-        "r": r,
-        "h": h,
-        "U": Indexed([None, *unit.T[:, :, None]], unit),
-        "f": Indexed([None, *f[:, 0]], f),
-        "v": Indexed([None, *v[:, 0]], v),
-        "D": Indexed([None, *diagonal], np.diag(diagonal)),
-        "K": Of(lambda j: before[j], "j"),
-        r"K\leftarrow": Of(lambda j: after[j], "j"),
-        r"U_j\leftarrow": Of(lambda j: columns[j], "j"),
-        r"D_j\leftarrow": Of(lambda j: smaller[j], "j"),
-        r"U_j^{\rm old}": Of(lambda j: unit[:, [j - 1]], "j"),
-    }
-    return found, running, {"U": U, "D": D, "K": K}
-
-
-def bierman(rng):
-    return loop(rng)[1]
-
-
-def at_the_end(rng):
-    found, running, last = loop(rng)
-    return found | {name: running[name] for name in (r"\alpha", "n", "h")} | last
-
-
-def at_the_beginning(rng):
-    return {"K": np.zeros((3, 1))}
-
-
-def two_measurements(rng):
-    """Bierman's case as a filter sees it: H = (1 1), A = diag(1, 1 + delta)."""
-    x, w, delta = rng.normal(size=2), rng.normal(size=2), 0.3
-    y = [x.sum() + w[0], (np.diag([1, 1 + delta]) @ x).sum() + w[1]]
-    return {"x": Indexed([None, *x]), "w": Indexed(w), "y": Indexed(y), r"\delta": delta}
-
-
 def one_measurement(rng):
     """A scalar measurement, and the prediction's root in the words of the text."""
     own, scalar = array(rng), _corrected(rng, 1)
@@ -151,24 +93,19 @@ def one_measurement(rng):
     }
 
 
-LETTERS = (
-    any_gain,
-    wrong_gain,
-    array,
-    bierman,
-    at_the_end,
-    at_the_beginning,
-    two_measurements,
-    one_measurement,
-)
+LETTERS = (any_gain, wrong_gain, array, one_measurement)
 _BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
 _AFTER = r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}"
 _BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"
 _WRONG = r"(K+\epsilon\gamma)"
 SAID = {
-    DEFINITION: [r"\mathsf Mw^2=\delta^2"],
+    DEFINITION: [
+        r"x_{k+1}=\begin{pmatrix}1&\Delta&\Delta^2/2\\0&1&\Delta\\0&0&1\end{pmatrix}x_k"
+        r"+\begin{pmatrix}0\\0\\1\end{pmatrix}v_k",
+        r"y_k=\begin{pmatrix}1&0&0\end{pmatrix}x_k+w_k",
+    ],
     "a condition": ["R>0"],
-    NOTATION: [r"p_{\rm Joseph}", r"p_{\rm textbook}"],
+    NOTATION: [r"p_{\rm Joseph}", r"p_{\rm textbook}", r"\det p/\det\Psi"],
 }
 EQUALS = {
     _BEFORE: f"{_AFTER}T^T",
@@ -180,7 +117,4 @@ EQUALS = {
     "YX^{-1}": "K",
     "ZZ^T": r"(I-KH)\Psi",
     r"(I-KH)\Psi": "p",
-    "UDU^T": "p",
-    r"z-\lambda": r"K(y-H\lambda)",
-    r"K(y-H\lambda)": r"z-\lambda",
 }

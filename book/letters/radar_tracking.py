@@ -1,16 +1,19 @@
-"""The letters of radar-tracking.md: the flight, a limit by python-control, least squares, and the
-package's alpha-beta filter."""
+"""The letters of radar-tracking.md: a limit by python-control, least squares, the package's
+alpha-beta filter and its filter with an acceleration made of measurements."""
 
 import numpy as np
 from control import dare
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed
-from gate.worlds import column
+from gate.worlds import column, covariance
 
 from kfcourse import run
 from kfcourse.filters.alphabeta import alpha_beta, steady_beta, tracking_index
+from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem
+from kfcourse.linear import run as run_linear
 from kfcourse.linear.system import linear_system
-from kfcourse.scenarios.flight import aircraft
+from kfcourse.scenarios.pointer import acceleration_from
 from kfcourse.scenarios.radar import kinematic
 
 ALPHA, SIGMA = 0.4, 3.0
@@ -45,22 +48,11 @@ keep: T, A, B, H, Q, \sigma_a, \sigma, x, v, w, y, k
 """
 
 
-def flight(rng):
-    track = aircraft(0.8)
-    i = int(rng.integers(len(track.time)))
-    east, north = track.velocity[i, :2]
-    return {
-        r"\dot r_x": east,
-        r"\dot r_y": north,
-        "V": np.hypot(east, north),
-        r"\psi": np.arctan2(north, east),
-    }
-
-
 def limit(rng):
     found = axis(rng)
     Psi = dare(found["A"].T, found["H"].T, found["Q"], np.array([[SIGMA**2]]))[0]
     F = Psi[0, 0] + SIGMA**2
+    p = Psi - Psi @ found["H"].T @ found["H"] @ Psi / F
     alpha, beta = Psi[0, 0] / F, Psi[1, 0] / F * found["T"]
     closed = np.eye(2) - column([alpha, beta / found["T"]]) @ found["H"]
 
@@ -69,24 +61,43 @@ def limit(rng):
         return np.linalg.det(value * np.eye(2) - (np.eye(2) - K @ found["H"]) @ found["A"])
 
     roots = np.roots([1 / 4, alpha - 2, alpha**2])  # of (alpha + beta / 2)^2 - 2 beta
-    near = 1 + 2.0**-30
 
     def E(zeta):
         return (1 - alpha) * (zeta - 1) ** 2 / np.linalg.det(zeta * np.eye(2) - closed @ found["A"])
 
     return found | {
         r"\Psi": Indexed(lambda i, j: Psi[i - 1, j - 1]),
+        "p": Indexed(lambda i, j: p[i - 1, j - 1]),
         "F": F,
+        "q": found[r"\sigma_a"] ** 2,
         r"\alpha": alpha,
         r"\beta": beta,
+        r"\rho": np.sqrt(1 - alpha),
         "a_0": 1.7,
         r"\Lambda": found[r"\sigma_a"] * found["T"] ** 2 / SIGMA,
         r"\chi": chi,
         "E": E,
-        r"\zeta": near,
-        r"\lim_{\zeta\to1}": 1.0,
+        r"\zeta": 1.7,
         r"\chi(-1)\big|_{\beta=\beta_-}": chi(-1, roots.min()),
         r"\chi(-1)\big|_{\beta=\beta_+}": chi(-1, roots.max()),
+    }
+
+
+def lagging(rng):
+    """A parabola without noise, followed until nothing changes."""
+    found = axis(rng)
+    T, beta, a = found["T"], steady_beta(ALPHA), 1.7
+    state = np.zeros(2)
+    for time in T * np.arange(400):
+        state = found["A"] @ state
+        miss = a * time**2 / 2 - state[0]
+        state += np.array([ALPHA, beta / T]) * miss
+    return found | {
+        r"\alpha": ALPHA,
+        r"\beta": beta,
+        "a_0": a,
+        r"\nu": miss,
+        r"\ell": a * time**2 / 2 - state[0],
     }
 
 
@@ -131,26 +142,6 @@ def step(rng):
     }
 
 
-noise_alone = r"""
-\alpha, \beta: in .3 .6
-\sigma: in 1 2
-M = \begin{pmatrix}1-\alpha&1-\alpha\\-\beta&1-\beta\end{pmatrix}
-G = \begin{pmatrix}\alpha\\\beta\end{pmatrix}
-P = GG^T
-again:
-P = MPM^T+\sigma^2GG^T
-then:
-\mathsf De^r = \begin{pmatrix}1&0\end{pmatrix}P\begin{pmatrix}1\\0\end{pmatrix}
-\mathsf De^s = \begin{pmatrix}0&1\end{pmatrix}P\begin{pmatrix}0\\1\end{pmatrix}
-keep: \alpha, \beta, \sigma, \mathsf De^r, \mathsf De^s
-"""
-
-
-def small_gains(rng):
-    alpha = rng.uniform(0.05, 0.1)
-    return {r"\alpha": alpha, r"\beta": steady_beta(alpha)}
-
-
 def limit_at_once(rng):
     """The same limit as matrices, and the filter's answer to a measurement that grows by a factor
     at each step."""
@@ -163,49 +154,90 @@ def limit_at_once(rng):
         "y": y,
         r"\hat x": x,
         r"\hat r": x[0].item(),
-        r"\rho": np.sqrt(1 - own[r"\alpha"]),
+        "p": Psi - K @ H @ Psi,
     }
-    return own | answer | {r"\Psi": Psi, "K": K, "q": own[r"\sigma_a"] ** 2}
+    return own | answer | {r"\Psi": Psi, "K": K}
 
 
-errors = r"""
-\alpha, \beta: in .3 .6
-a, b: num
-n: nums 6
-k: range 5
-r_0 = 0
-s_0 = 0
-r_{k+1} = r_k+s_k+\alpha(a+(k+1)b+n_{k+1}-r_k-s_k)
-s_{k+1} = s_k+\beta(a+(k+1)b+n_{k+1}-r_k-s_k)
-e^r_k = r_k-a-kb
-e^s_k = s_k-b
-k: range 1 5
-keep: e^r, e^s, \alpha, \beta, n, k
-"""
+def controlled(rng):
+    """A run with the control."""
+    found = axis(rng)
+    y = rng.normal(size=(6, 1, 2))
+    u = np.nan_to_num(acceleration_from(y, found["T"]))[..., :1]
+    Q = (found["Q"] + found["Q"].T) / 2
+    system = LinearSystem(found["A"], found["H"], Q, np.array([[SIGMA**2]]), found["B"])
+    law = run_linear(system, Gaussian(rng.normal(size=2), covariance(rng, 2)), y[..., :1], u)
+    z, lam = ([column(one) for one in laws.mean[:, 0]] for laws in (law.posterior, law.predicted))
+    return found | {
+        r"\lambda": Indexed(lam),
+        "z": Indexed(z),
+        "u": Indexed(u[:, 0, 0]),
+        "y": Indexed(y[:, 0, 0]),
+        "k": range(2, 5),
+    }
+
+
+def transfers(rng):
+    """What leads from y to the error, by matrices."""
+    found = limit_at_once(rng)
+    A, B, H, K, T = (found[name] for name in "ABHKT")
+    rest = np.eye(2) - K @ H
+
+    def error(control):
+        def E(zeta):
+            taken = K + rest @ B * (1 - 1 / zeta) ** 2 / T**2 / zeta * control
+            return 1 - np.linalg.solve(np.eye(2) - rest @ A / zeta, taken)[0, 0]
+
+        return E
+
+    return {"E": error(0), "E_u": error(1), r"\zeta": 1.7}
+
+
+def polar(rng):
+    """The meter's derivatives by differences."""
+    x = rng.uniform(1, 2, 2)
+
+    def h(x):
+        return np.array([abs(complex(*x)), np.angle(complex(*x))])
+
+    steps = 1e-6 * np.eye(2)
+    H = np.column_stack([(h(x + one) - h(x - one)) / 2e-6 for one in steps])
+    return {
+        "r_x": x[0],
+        "r_y": x[1],
+        "d": h(x)[0],
+        r"\varphi": h(x)[1],
+        "h": lambda _: column(h(x)),
+        "x": 0,
+        r"\operatorname{atan2}": lambda y, x: np.arctan2(y, x),
+        "H": H,
+        r"\frac{\partial h}{\partial(r_x,r_y)}": H,
+    }
 
 
 LETTERS = (
     model,
-    flight,
     limit,
+    lagging,
     growing,
     start,
     step,
-    noise_alone,
-    small_gains,
     limit_at_once,
-    errors,
+    controlled,
+    transfers,
+    polar,
 )
 SAID = {
     DEFINITION: [r"v_k\sim\mathcal N(0,\sigma_a^2)", r"w_k\sim\mathcal N(0,\sigma^2)"],
     "quoted from the radar paper": [r"K=[\alpha,\beta/T]^T"],
-    NOTATION: ["0", r"\beta_-", r"\beta_+", r"E(\zeta)", r"\text{lag}", r"\text{instead of}\quad0"],
-    "quoted from Benedict and Bordner": [r"\beta=\alpha^2/(2-\alpha)"],
-    CONDITION: [r"\chi(-1)<0", r"\beta=4-2\alpha"],
+    NOTATION: ["0", r"E(\zeta)"],
+    CONDITION: [r"|\zeta|=1"],
 }
 EQUALS = {
+    r"\chi(\zeta)": r"\zeta^2-(2-\alpha-\beta)\zeta+1-\alpha",
+    r"\chi(1)": r"\beta",
     r"\chi(-1)": r"4-2\alpha-\beta",
-    r"\chi(-1)\big|_{\beta=\beta_-}": r"4\sqrt{1-\alpha}",
-    r"\chi(-1)\big|_{\beta=\beta_+}": r"-4\sqrt{1-\alpha}",
-    r"\lim_{\zeta\to1}\frac{E(\zeta)}{(\zeta-1)^2}\,T^2": r"T^2(1-\alpha)/\beta",
+    r"\chi(-1)\big|_{\beta=\beta_-}": r"4\rho",
+    r"\chi(-1)\big|_{\beta=\beta_+}": r"-4\rho",
+    r"\frac{E_u(\zeta)}{E(\zeta)}": r"\frac{(\zeta-1)(2\zeta+1)}{2\zeta^2}",
 }

@@ -5,7 +5,6 @@ import numpy as np
 from gate.page import DEFINITION, NOTATION
 from gate.values import Indexed, Of, Operator, bell
 from gate.worlds import chain_run
-from scipy.optimize import minimize_scalar
 
 densities = r"""
 a = 0.8
@@ -26,6 +25,7 @@ G = H^2p+R
 "p(x_{k-1}\mid y_{0:k-1})" of x_{k-1} = \mathcal N(x_{k-1};z,p)
 "p(x_k\mid y_{0:k-1})" of x_k = \mathcal N(x_k;m,\Psi)
 "p(y_k\mid x_k)" of x_k = \mathcal N(y;Hx_k,R)
+"p(y_k\mid x_k,y_{0:k-1})" of x_k = \mathcal N(y;Hx_k,R)
 "p(x_k\mid y_{0:k})" of x_k = \mathcal N(x_k;m+K(y-Hm),\Psi-KH\Psi)
 "p(y_k\mid y_{0:k-1})" = \mathcal N(y;Hm,F)
 "p(x_0)" of x_0 = \mathcal N(x_0;z,p)
@@ -68,26 +68,6 @@ def chain(rng):
     }
 
 
-def odds(rng):
-    """The odds of the shadow after a step of the chain of two states, and the steepest slope of
-    their logarithm."""
-    alpha, beta = rng.uniform(0.05, 0.3, size=2)
-    P = np.array([[1 - alpha, alpha], [beta, 1 - beta]])  # from and to: present, shadowed
-
-    def after(o):
-        present, shadowed = np.array([1, o]) / (1 + o) @ P
-        return shadowed / present
-
-    def slope(log_o):
-        return (np.log(after(np.exp(log_o + 1e-20j))) / 1e-20).imag
-
-    steepest = -minimize_scalar(
-        lambda log_o: -slope(log_o), bounds=(-9, 9), method="bounded", options={"xatol": 1e-9}
-    ).fun
-    o = rng.uniform(0.5, 2)
-    return {r"\alpha": alpha, r"\beta": beta, "o": o, "o'": after(o), r"\varkappa": steepest}
-
-
 def splitting(rng):
     """What a meter with three readings tells of a state with four values."""
     joint, x = rng.dirichlet(np.ones(12)).reshape(3, 4), rng.normal(size=4)
@@ -117,20 +97,36 @@ q: in .2 .8
 """
 
 
-LETTERS = (densities, joint, chain, odds, splitting, shadow)
+product = r"""
+y, H, x, \lambda: num
+R, \Psi: pos
+F = H^2\Psi+R
+p = 1/(1/\Psi+H^2/R)
+K = pH/R
+\nu = y-H\lambda
+e = x-\lambda
+"""
+marginal = r"""
+x_k, z_{k-1}, A: num
+p_{k-1}, Q: pos
+"""
+
+
+LETTERS = (densities, joint, chain, product, marginal, splitting, shadow)
 SAID = {
     DEFINITION: [
         r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
         "y_k=S_k(x_k)+n_k",
         r"x_0\sim\mathcal N(m_0,D_0)",
+        r"x_{k+1}=x_k+0.3\Bigl(1+\frac1{1+x_k^2}\Bigr)+0.2\,v_k",
+        r"y_k=\sqrt{x_k^2+1}+0.2\,w_k",
+        r"x_0\sim\mathcal N(-1,2)",
         r"P_{ij}=p(x_k=x_j\mid x_{k-1}=x_i)",
     ],
     NOTATION: [
         r"Z_k=p(y_k\mid y_{1:k-1})",
         r"\prod_kC_k^{-1}",
-        r"\frac{p(x_2\mid y_{0:2})}{p(x_2,y_{0:2})/p(y_{0:2})}",
-        r"\frac{C_0^{-1}C_1^{-1}C_2^{-1}}{p(y_{0:2})}",
         r"\mathsf{M}[x^2|y]",
-        r"\ln{C}_k^{-1}",
+        r"\mathsf{M}[(x-z)^2|y]",
     ],
 }

@@ -82,8 +82,10 @@ def over_state(rng):
     x, mean = normal_nodes(m, d)
     functions = world(over_noise)(rng)
     values = {name: functions[name](x) for name in (r"\alpha", r"\beta", r"\gamma", r"\eta")}
-    G = mean(values[r"\beta"] * (x - m)) / d
-    western = {"C": mean(values[r"\beta"] * (x - m)), "d": d}
+    C = mean(values[r"\beta"] * (x - m))
+    western = {"C": C, r"\mathrm{Cov}(x,y)": C, "d": d}
+    moved, mean_there = normal_nodes(m + 1e-6, d)
+    G = (mean_there(functions[r"\beta"](moved)) - mean(values[r"\beta"])) / 1e-6
     slope = {r"\frac{\partial h}{\partial m}": G, r"\partial h/\partial m": G}
     return (
         of_package(gaussian(MODEL), m, d)
@@ -124,6 +126,9 @@ def variant(rng):
 LETTERS = (by_tangents, over_noise, in_short, over_state, moments, variant)
 SAID = {
     DEFINITION: [
+        "x_{k+1}=cx_k+ex_kv_k",
+        "y_k=gx_k+fx_k^2w_k",
+        r"w_k\sim\mathcal N(0,1)",
         "x_{k+1}=a(x_k,v_k)",
         "y_k=b(x_k,w_k)",
         r"x\sim\mathcal N(z,p)",

@@ -1,6 +1,6 @@
 """The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
 
-from gate.page import DEFINITION
+from gate.page import DEFINITION, NOTATION
 from gate.worlds import column, covariance
 
 from kfcourse.scenarios.navigation import Clock, Dynamics
@@ -57,11 +57,14 @@ K = 1-R/(p+Q+R)
 
 LETTERS = (clock, prediction, late, one_step_late, late_gain)
 SAID = {
+    NOTATION: [r"\text{loss}", r"\text{has}-\text{claims}"],
     DEFINITION: [
         r"\hat s(t)=s(t-\tau)",
         r"\hat V(t)=\dot s(t-\tau)",
         r"\hat b(t)=u(t)-\ddot s(t-\tau)",
         "c(t)=rt+c_0",
+        r"\dot x=Ax+Bu+\xi",
+        "y_{i,k}=H_ix(t_{i,k})+n_{i,k}",
     ],
 }
 EQUALS = {

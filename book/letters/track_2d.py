@@ -1,9 +1,9 @@
 """The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a
-telescoping sum."""
+mean given measurements."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed
+from gate.values import Indexed, Operator
 from gate.worlds import K_RANGE, column, covariance
 
 from kfcourse.laws import Gaussian
@@ -61,46 +61,33 @@ def sample_lost(rng):
 
 
 axes = r"""
-\Delta = 0.3
 \sigma = 1.3
 I: eye 2
 R = \sigma^2I
-B = \begin{pmatrix}\Delta^2/2&0\\0&\Delta^2/2\\\Delta&0\\0&\Delta\end{pmatrix}
-G = \begin{pmatrix}\Delta^2/2&0&0&0\\0&\Delta^2/2&0&0\\0&0&\Delta&0\\0&0&0&\Delta\end{pmatrix}
-a_x, a_y: num
-"(a_x,a_y)^T" = \begin{pmatrix}a_x\\a_y\end{pmatrix}
-"(a_x,a_y,a_x,a_y)^T" = \begin{pmatrix}a_x\\a_y\\a_x\\a_y\end{pmatrix}
 """
 
 
-telescope = r"""
-y: nums 9
-k: range 2 8
-r_2 = y_2
-v_2 = (3y_2-4y_1+y_0)/2
-r_{k+1} = r_k+v_k+(y_k-2y_{k-1}+y_{k-2})/2
-v_{k+1} = v_k+y_k-2y_{k-1}+y_{k-2}
-\delta_k = r_{k+1}-(y_k+y_{k-1})/2
-k: range 2 7
-keep: y, \delta, k
-"""
+def no_news(rng):
+    """The mean of the states that share a measurement, and any other function of it."""
+    mass, x = rng.dirichlet(np.ones(12)), rng.normal(size=12)
+    seen = np.repeat(np.arange(3), 4)
+    best = np.array([np.average(x[seen == one], weights=mass[seen == one]) for one in seen])
+    return {
+        "x": x,
+        r"\lambda": best,
+        r"\lambda'": rng.normal(size=3)[seen],
+        r"\mathsf M": Operator(lambda values: float(mass @ values)),
+    }
 
 
-LETTERS = (filtered, sample_lost, axes, telescope)
-_INPUT = r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}"
+LETTERS = (filtered, sample_lost, axes, no_news)
 SAID = {
     DEFINITION: [
         r"x_{k+1}=Ax_k+B\,(u_k+\xi_k)",
         "y_k=Hx_k+w_k",
         r"\xi_k\sim\mathcal N(0,\sigma_a^2I)",
         r"w_k\sim\mathcal N(0,R)",
+        "y_i=|r-b_i|+w_i",
     ],
-    NOTATION: [r"Q_{\rm const}", r"Q_{\rm white}", r"\delta^2", r"s(\tau)", "0"],
-}
-EQUALS = {
-    r"G\,(a_x,a_y,a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta "
-    r"a_y\end{pmatrix}",
-    r"B\,(a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta "
-    r"a_y\end{pmatrix}",
-    r"\delta_{k+1}-\delta_k": r"\frac32(y_0-2y_1+y_2)",
+    NOTATION: [r"Q_{\rm const}", r"Q_{\rm white}", r"\sum_{i=0}^{j-1}(i+\tfrac{1}{2})^2"],
 }

@@ -218,6 +218,6 @@ SET = ExerciseSet(
     QUESTIONS,
     chapters=(
         "lab-filters",
-        "extended-kalman",
+        "linearisation",
     ),
 )

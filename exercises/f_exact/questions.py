@@ -190,10 +190,7 @@ SET = ExerciseSet(
     "The exact filter on a grid",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=(
-        "stratonovich",
-        "checking-exact",
-    ),
+    chapters=("stratonovich", "comparison"),
     numbers=companion_numbers,
     angles=("x", "y"),  # its companion has none
 )

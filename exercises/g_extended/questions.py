@@ -254,5 +254,5 @@ SET = ExerciseSet(
     "The extended Kalman filter and its consistency",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("extended-kalman", "consistency"),
+    chapters=("linearisation", "consistency"),
 )

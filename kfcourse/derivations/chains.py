@@ -1,11 +1,10 @@
 """The text of a whole derivation: headings that say what letters mean, and chains of lines.
 
-variant 53                                  whose structural functions and parameters the letters
-are
-linearised                                  tau, Theta, h, G, F are those of the tangent; otherwise
-the exact ones x ~ N(m, d)                                 letters of the law that means are over
-positive c, g                               letters that are positive; variances are without saying
-letters S, q                                more letters that may be used
+variant 53          whose structural functions and parameters the letters are
+linearised          tau, Theta, h, G, F are those of the tangent; otherwise the exact ones
+x ~ N(m, d)         letters of the law that means are over
+positive c, g       letters that are positive; variances are without saying
+letters S, q        more letters that may be used
 
 ::
 

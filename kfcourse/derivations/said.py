@@ -3,8 +3,6 @@ would be right."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from kfcourse.derivations.setting import Setting
 from kfcourse.derivations.slips import Slip, named, term_path
 from kfcourse.derivations.terms import CALL, MEAN, POWER, SUM, Node, at, letters, walk, written
@@ -67,35 +65,25 @@ def told(
         where = f"`{term}` of the line above" if term else "a term of the definition"
         return f"what has been made of {where} is not right{_moment(slip)}", term
     place = named(line, slip.path)
-    term, of = (
-        shown(text, at(line, place)),
-        "the sign of" if place == term_path(line, slip.path) else "a sign in",
-    )
-    says: dict[str, Callable[[], str]] = {
-        "sign": lambda: f"{of} `{term}` is not right",
-        "doubled": lambda: f"`{term}` stands there twice",
-        "letter": lambda: (
-            f"in `{term}` the letter {slip.name}, {_role(setting, slip.name)}, stands in another "
-            f"one's place"
-        ),
-        "moment": lambda: f"`{term}` is not right{_moment(slip)}",
-        "power": lambda: f"{slip.name or 'something'} has the wrong power in `{term}`",
-        "factor": lambda: f"a number in `{term}` is not right",
-        "noise-forgotten": lambda: (
-            f"the mean square of the noise {slip.name} is forgotten: its part is missing"
-        ),
-        "noise-mean": lambda: f"the mean of the noise {slip.name} is not zero in this line",
-        "lost-factor": lambda: f"a factor is lost from `{term}`: {slip.name}",
-        "extra": lambda: (
-            f"something in `{term}` does not belong there"
-            if slip.name
-            else f"`{term}` does not belong there"
-        ),
-        "function": lambda: f"in `{term}` another function belongs in the place of {slip.name}",
-        "lost": lambda: f"a term is lost{_lost(slip, text_above)}, in `{term}`",
-        "combined": lambda: f"`{term}` is not right: more than one of its factors",
+    term = shown(text, at(line, place))
+    of = "the sign of" if place == term_path(line, slip.path) else "a sign in"
+    says = {
+        "sign": f"{of} `{term}` is not right",
+        "doubled": f"`{term}` stands there twice",
+        "letter": f"in `{term}` the letter {slip.name}, {_role(setting, slip.name)}, stands in "
+        "another one's place",
+        "moment": f"`{term}` is not right{_moment(slip)}",
+        "power": f"{slip.name or 'something'} has the wrong power in `{term}`",
+        "factor": f"a number in `{term}` is not right",
+        "noise-forgotten": f"the mean square of the noise {slip.name} is forgotten: its part is "
+        "missing",
+        "noise-mean": f"the mean of the noise {slip.name} is not zero in this line",
+        "lost-factor": f"a factor is lost from `{term}`: {slip.name}",
+        "extra": f"{'something in ' if slip.name else ''}`{term}` does not belong there",
+        "function": f"in `{term}` another function belongs in the place of {slip.name}",
+        "lost": f"a term is lost{_lost(slip, text_above)}, in `{term}`",
     }
-    return says[slip.kind](), term
+    return says[slip.kind], term
 
 
 def _moment(slip: Slip) -> str:
@@ -134,15 +122,11 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
         noises and kind in ("extra", "lost", "doubled", "")
     ):
         return RULES["noise"]
-    states = [one for one in _means(above) if letters(one) & set(setting.law.states)]
-    if kind == "moment" or (
-        len(states) > len([one for one in _means(line) if letters(one) & set(setting.law.states)])
-    ):
-        return RULES[
-            "functions"
-            if any(one.kind == CALL for mean in states for _, one in walk(mean))
-            else "moments"
-        ]
+    states = set(setting.law.states)
+    means, left = ([one for one in _means(node) if letters(one) & states] for node in (above, line))
+    if kind == "moment" or len(means) > len(left):
+        calls = any(one.kind == CALL for mean in means for _, one in walk(mean))
+        return RULES["functions" if calls else "moments"]
     if kind in ("lost", "factor", "extra") and _squares(above) > _squares(line):
         return RULES["square"]
     if kind in ("power", "lost-factor") and slip and slip.name not in setting.law.random:

@@ -1,27 +1,20 @@
-r"""Which single change of a line makes it equal to the one above?
+"""Which single change of a line makes it equal to the one above?
 
-Let the line be a tree, and A the value of the line above.  Going down from the root, what a node
-should be follows from A and from the nodes beside it: tau = A - b for the term a of a + b, tau = A
-/ b for the factor a of a b, and so on; inside a mean, a square or a function it follows if the line
-above has one of the right value.  Beside its own value t this tells the slip:
-
-    tau = -t                    a sign            tau = q t, q a number          a number in front
-    tau = t c, c of letters     a power, a factor, a letter for another one
-    tau = 0                     doubled, or too much
-    tau - t = q c, or a term of the line above                                  a term is lost
-    tau / t = M[x^4] / (3 d^2), and others of the normal law                     a moment
-
-All of it by values at random points.  Where nothing follows, changes are tried: each of the same
-kinds, one node at a time. The change that is found is made in the tree, and the line must then be
-equal to the one above.
+Changes are tried, one node of the line at a time: the sign of a term, a number in front, a power, a
+letter for another one, a factor or a term lost or too much, a moment of the normal law for another
+one.  So are changes of the line above: what of it would give this line?  Values at a few random
+points choose; the line with the change must then be equal to the one above, as lines are compared.
+What a sum lacks is found as q c, c of letters, from its values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from itertools import chain
+from math import gcd
+from typing import Any
 
 import numpy as np
 
@@ -54,8 +47,7 @@ from kfcourse.derivations.values import ENTIRE, Uncomputed, Values
 from kfcourse.laws import Array
 
 CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly
-MOST_TRIED = 4000  # changes
-CERTAIN = 1.35  # cost of a slip beside which no other one is looked for
+MOST_TRIED = 30000  # changes
 COSTS = {  # what is named if several changes explain a line
     "sign": 1.0,
     "doubled": 1.05,
@@ -69,8 +61,14 @@ COSTS = {  # what is named if several changes explain a line
     "extra": 1.4,
     "function": 1.4,
     "lost": 1.5,
-    "combined": 3.0,
 }
+NUMBERS = [  # in front of a term
+    Fraction(-1),
+    *(Fraction(p, q) for q in range(1, 7) for p in range(1, 7) if p != q and gcd(p, q) == 1),
+]
+POWERS = (1, 2, 3, 4, Fraction(1, 2), -1, -2)
+PROBES = Fraction(17, 60), Fraction(71, 60), Fraction(-49, 60)  # values of a node
+OF_THE_LINE_ABOVE = 1.0  # an addition to the cost
 
 
 @dataclass(frozen=True)
@@ -83,8 +81,6 @@ class Slip:
         A key of `COSTS`.
     path : tuple of int
         Way from the root to what is changed, in the line; to the term of the line above if `above`.
-    repaired : Node
-        The line with the change.
     name : str
         The letter, the function or the noise concerned.
     order : int
@@ -97,16 +93,10 @@ class Slip:
 
     kind: str
     path: Path
-    repaired: Node
     name: str = ""
     order: int = 0
     lost: Node | None = None
     above: bool = False
-    extra: float = 0.0
-
-    @property
-    def cost(self) -> float:
-        return COSTS[self.kind] + self.extra
 
 
 def term_path(root: Node, path: Path) -> Path:
@@ -130,23 +120,9 @@ def named(root: Node, path: Path) -> Path:
 def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
     """The slips that explain a line best, at most two of different terms; none if no single change
     does."""
-    search = _Search(setting, line, _open(setting, above))
-    found = search.best([*search.solved(), *search.noise()])
-    if not found or search.cost > CERTAIN:
-        found = (
-            search.best(one for one in search.tried() if not found or one.cost < search.cost)
-            or found
-        )
-    return found or search.best(search.misread())
-
-
-def _open(setting: Setting, node: Node) -> Node:
-    """A letter that stands for a tree, opened, so that its terms can be seen."""
-    return (
-        setting.meanings[node.data]
-        if node.kind == LETTER and node.data in setting.meanings
-        else node
-    )
+    if above.kind == LETTER and above.data in setting.meanings:  # opened, to see its terms
+        above = setting.meanings[above.data]
+    return _Search(setting, line, above).best()
 
 
 @dataclass
@@ -154,74 +130,240 @@ class _Search:
     setting: Setting
     line: Node
     above: Node
-    mirrored: bool = False  # the line above has the wrong values, and the line the right ones
     values: Values = field(init=False)
-    cost: float = field(init=False, default=np.inf)  # of what was found best
 
     def __post_init__(self) -> None:
-        free: set[str] = set()
-        waiting = [self.line, self.above]
+        free, waiting = set(self.setting.law.letters), [self.line, self.above]
         while waiting:
             for name in letters(waiting.pop()) - free:
                 free.add(name)
                 if name in self.setting.meanings:
                     waiting.append(self.setting.meanings[name])
-        self.letters = sorted(free - set(self.setting.meanings) | set(self.setting.law.letters))
-        self.values = Values(
-            self.setting, [self.line, self.above], points=len(self.letters) + 10, seed="slip"
-        )
-        self.target = self.values.of(self.above, keep=True)
-        self.values.of(self.line, keep=True)
-        columns = [np.log(np.abs(self.values.letter(name))) for name in self.letters]
-        self.logs = np.array([np.ones(self.values.points), *columns]).T
-        self.inverse = np.linalg.pinv(self.logs)
-        self.moments = list(self._moment_pairs())
-
-    # ---------------------------------------------------------------- what is found, made sure of
-
-    def best(self, found: Iterable[Slip]) -> list[Slip]:
-        """The cheapest that hold, one for each term."""
-        kept: list[Slip] = []
-        places: set[tuple[bool, Path]] = set()
-        priced = [
-            (slip.cost + self._unlikely(slip), -len(slip.path), i, slip)
-            for i, slip in enumerate(found)
+        self.pool = sorted(free)
+        self.letters = [name for name in self.pool if name not in self.setting.meanings]
+        both = [self.line, self.above]
+        self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
+        self.mine, self.theirs = (self.values.of(one, keep=True) for one in both)
+        logs = [np.log(np.abs(self.values.letter(name))) for name in self.letters]
+        self.inverse = np.linalg.pinv(np.array([np.ones(self.values.points), *logs]).T)
+        self.terms = [
+            (sign, one)
+            for _, node in walk(self.above)
+            if node.kind == SUM
+            for sign, one in zip(node.data, node.parts, strict=True)
         ]
-        for cost, _, _, slip in sorted(priced):
-            if kept and cost > self.cost and slip.cost != kept[0].cost:
-                continue
-            place = slip.above, term_path(self.above if slip.above else self.line, slip.path)
+
+    def best(self) -> list[Slip]:
+        """The cheapest that hold, one for each term."""
+        fitting = [
+            (cost + self._unlikely(slip), -len(slip.path), i, slip, tree)
+            for i, (cost, slip, tree) in enumerate(self.fitting())
+        ]
+        kept: list[tuple[float, Slip]] = []
+        for cost, _, _, slip, tree in sorted(fitting, key=lambda one: one[:3]):
+            if kept and cost > kept[0][0] + 1e-9:
+                break
+            place = self._place(slip)
             # around a term that is named already
-            if any(place == (one[0], one[1][: len(place[1])]) for one in places):
+            if any(self._place(one)[: len(place)] == place for _, one in kept):
                 continue
-            if not self._equal(slip.repaired, self.above):
-                continue
-            places.add(place)
-            kept.append(slip)
-            self.cost = cost if len(kept) == 1 else self.cost
-        if kept and kept[0].kind == "doubled":  # either of the two
-            return kept[-1:]
-        return kept if len(kept) <= 2 else []
+            if self._equal(tree, self.line if slip.above or _of_noise(slip) else self.above):
+                kept.append((cost, slip))
+        slips = [slip for _, slip in kept]
+        if slips and slips[0].kind == "doubled":  # either of the two
+            return slips[-1:]
+        return slips if len(slips) <= 2 else []
+
+    def _place(self, slip: Slip) -> Path:
+        return term_path(self.above if slip.above else self.line, slip.path)
+
+    def fitting(self) -> Iterator[tuple[float, Slip, Node]]:
+        """Changes that give the right values: cost, slip, the changed tree."""
+        for name in [one for one in self.setting.law.noises if one in letters(self.above)]:
+            for kind, value in (("noise-forgotten", 0), ("noise-mean", 1)):
+                tree = replaced(self.above, {name: number(value)})
+                if self._same(self.values.of(tree), self.mine):
+                    yield COSTS[kind], Slip(kind, (), name), tree
+        moments, count = list(self._moments()), 0
+        for wrong, right, _ in moments:
+            self.values.of(product(wrong, right), keep=True)
+        for root, other in ((self.line, False), (self.above, True)):
+            target = self.mine if other else self.theirs
+            for path, node in walk(root):
+                around = [at(root, path[:i]) for i in range(len(path))]
+                wanted = self._wanted(root, path, around, target)
+                changes = self._of_moments(path, node, around, moments, other)
+                if not other:
+                    changes = chain(changes, self._of_node(path, node, around, wanted))
+                for cost, slip, new in changes:
+                    count += 1
+                    if count > MOST_TRIED:
+                        return
+                    one, its = (
+                        (changed(root, path, new), target) if wanted is None else (new, wanted)
+                    )
+                    if self._same(self.values.of(one), its):
+                        tree = changed(root, path, new)
+                        if not self._nothing(tree, path, around, slip.kind):
+                            yield cost, slip, tree
+
+    def _nothing(self, tree: Node, path: Path, around: list[Node], kind: str) -> bool:
+        """Whether a change leaves nothing of the mean or the power around it: then that does not
+        belong there as a whole.
+
+        With a noise that was lost a mean may be zero, and rightly so.
+        """
+        for i, one in enumerate(around):
+            if one.kind in (MEAN, CALL, POWER):
+                outer = at(tree, path[:i])
+                left = self.values.of(outer.parts[0] if kind == "lost-factor" else outer)
+                return bool(np.all(np.abs(left) <= 1e-9))
+        return False
+
+    def _wanted(self, root: Node, path: Path, around: list[Node], target: Array) -> Array | None:
+        """What the value of a node should be; None inside a power, a function or a mean.
+
+        Outside of them the line is (a + b t)/(c + d t), t the value: four of such values have one
+        cross-ratio with those of t.
+        """
+        if any(one.kind not in (SUM, PRODUCT) for one in around):
+            return None
+        p, q, r = PROBES
+        first, second, third = (self.values.of(changed(root, path, number(one))) for one in PROBES)
+        with np.errstate(all="ignore"):
+            ratio = (target - first) * (second - third) / (target - third) / (second - first)
+            ratio = ratio * float((q - p) / (q - r))
+            wanted = (float(p) - ratio * float(r)) / (1 - ratio)
+        return wanted if np.isfinite(wanted).all() else None
+
+    def _of_moments(
+        self, path: Path, node: Node, around: list[Node], moments: list[Any], other: bool
+    ) -> Iterator[tuple[float, Slip, Node]]:
+        """A moment in the place of another; of the line above, the other way round."""
+        if not around or around[-1].kind in (SUM, POWER):
+            for wrong, right, order in moments:
+                pair = (wrong, right) if other else (right, wrong)
+                slip = Slip("moment", path, order=order, above=other)
+                cost = COSTS["moment"] + OF_THE_LINE_ABOVE * other
+                yield cost, slip, product(node, *pair, exponents=(1, 1, -1))
+
+    def _of_node(
+        self, path: Path, node: Node, around: list[Node], wanted: Array | None
+    ) -> Iterator[tuple[float, Slip, Node]]:
+        """Changes of one node of the line: cost, slip, the new node."""
+        parts, data = node.parts, node.data
+        outer = around[-1].kind if around else ""
+        beside = bool(around) and len(around[-1].parts) > 1
+
+        def slip(
+            kind: str,
+            new: Node,
+            name: str = "",
+            below: Path = (),
+            more: float = 0,
+            lost: Any = None,
+        ) -> tuple[float, Slip, Node]:
+            return COSTS[kind] + more, Slip(kind, path + below, name, lost=lost), new
+
+        if node.kind == SUM:
+            for i, part in enumerate(parts):
+                signs = tuple(-s if i == j else s for j, s in enumerate(data))
+                yield slip("sign", Node(SUM, parts, signs), below=(i,))
+                value = data[i] * self.values.of(part)
+                twice = any(
+                    j != i and self._same(data[j] * self.values.of(one), value)
+                    for j, one in enumerate(parts)
+                )
+                gone = Node(SUM, (*parts[:i], number(0), *parts[i + 1 :]), data)
+                if len(parts) > 1:
+                    yield slip("doubled" if twice else "extra", gone, below=(i,))
+        if node.kind == LETTER:
+            yield from (slip("letter", letter(name), data) for name in self.pool if name != data)
+        base, own = (parts[0], data) if node.kind == POWER else (node, 1)
+        if base.kind != NUMBER:
+            name = base.data if base.kind == LETTER else ""
+            yield from (slip("power", power(base, k), name) for k in POWERS if k != own)
+        if node.kind == CALL:
+            yield from (slip("function", Node(CALL, parts, name), data) for name in ENTIRE)
+        if node.kind == PRODUCT:
+            for i, part in enumerate(parts):
+                name = part.data if part.kind == LETTER else ""
+                rest = Node(PRODUCT, (*parts[:i], number(1), *parts[i + 1 :]), data)
+                yield slip("extra", rest, name, below=(i,))
+        if outer != PRODUCT:
+            for q in NUMBERS:
+                kind, new = "sign" if q == -1 else "factor", product(number(q), node)
+                yield slip(kind, new, more=0.35 * (node.kind == LETTER and beside))
+            for name in self.pool:
+                for k in (1, 2):
+                    yield slip("lost-factor", product(power(letter(name), k), node), name)
+        if outer != SUM:
+            for _, one in self.terms:
+                for term in (one, mean(one)):
+                    for sign in (1, -1):
+                        yield slip("lost", total(node, term, signs=(1, sign)), lost=one)
+            if wanted is not None:
+                for q, powers in self._monomial(wanted - self.values.of(node)):
+                    factors = [power(letter(name), k) for name, k in powers.items()]
+                    # in the sum where least is lost
+                    more = 0.02 * sum(map(abs, powers.values())) + 0.1 * (node.kind != SUM)
+                    new = total(node, product(number(q), *factors))
+                    yield slip("lost", new, " and ".join(powers), more=more)
+
+    def _monomial(self, values: Array) -> Iterator[tuple[Fraction, dict[str, int]]]:
+        """q and powers of letters of which these may be the values."""
+        with np.errstate(all="ignore"):
+            found = (self.inverse @ np.log(np.abs(values)))[1:]
+            if np.abs(found).max(initial=0) <= 12:
+                powers = {
+                    n: int(k) for n, k in zip(self.letters, np.round(found), strict=True) if k
+                }
+                for name, k in powers.items():
+                    values = values / self.values.letter(name) ** float(k)
+                if q := Fraction(float(np.median(values))).limit_denominator(60):
+                    yield q, powers
+
+    def _moments(self) -> Iterator[tuple[Node, Node, int]]:
+        """Wrong and right moments of the normal law, and their order; of functions, too."""
+        law = self.setting.law
+        at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
+        for _, call in [*walk(self.line), *walk(self.above)]:
+            if call.kind == CALL and call.data in ENTIRE and letters(call) & set(law.states):
+                square, there = mean(power(call, 2)), replaced(call, at_mean)
+                yield there, mean(call), 0
+                yield power(there, 2), square, 0
+                yield power(mean(call), 2), square, 0
+        for i, x in enumerate(law.states):
+            m, d, moment = letter(law.means[i]), letter(law.cov[i][i]), mean(power(letter(x), 2))
+            for k in range(2, 9):
+                raw, half = mean(power(letter(x), k)), Fraction(k, 2)
+                central = mean(power(difference(letter(x), m), k))
+                yield power(m, k), raw, k
+                if k % 2 == 0:
+                    yield central, raw, k
+                    yield raw, central, k
+                if k in (4, 6, 8):
+                    yield power(moment, half), raw, k
+                    many = number({4: 3, 6: 15, 8: 105}[k])
+                    yield product(many, power(moment, half)), raw, k
+                    yield power(d, half), central, k
+                    yield power(d, half), raw, k
+                if k == 4:
+                    yield raw, difference(raw, power(moment, 2)), k
 
     def _unlikely(self, slip: Slip) -> float:
         """An addition to the cost of changing a term that is nothing, or that stands in the line
         above as it is."""
-        if slip.above or slip.kind in ("doubled", "extra", "lost", "noise-forgotten", "noise-mean"):
+        if slip.above or _of_noise(slip) or slip.kind in ("doubled", "extra", "lost"):
             return 0.0
         path = term_path(self.line, slip.path)
-        value = self.values.of(at(self.line, path), keep=True)
+        value = self.values.of(at(self.line, path))
+        if path:
+            value = value * at(self.line, path[:-1]).data[path[-1]]
         stays = path and any(
-            self._same(_sign(self.line, path) * value, other) for other in self.as_above
+            self._same(value, sign * self.values.of(one)) for sign, one in self.terms
         )
         return 0.35 if stays or np.all(np.abs(value) <= 1e-10) else 0.0
-
-    @cached_property
-    def as_above(self) -> list[Array]:
-        """Values of the terms of the line above, with their signs."""
-        paths = [
-            path for path, _ in walk(self.above) if path and at(self.above, path[:-1]).kind == SUM
-        ]
-        return [_sign(self.above, path) * self.values.of(at(self.above, path)) for path in paths]
 
     def _equal(self, first: Node, second: Node) -> bool:
         try:
@@ -233,364 +375,6 @@ class _Search:
         with np.errstate(all="ignore"):
             return bool(np.all(np.abs(a - b) <= CLOSE * (np.abs(a) + np.abs(b)) + 1e-14))
 
-    # ---------------------------------------------------------------- solved for
 
-    def solved(self) -> Iterator[Slip]:
-        for path, node, t, tau in self._needed(self.line, self.target, (), self.above):
-            yield from self._told(path, node, t, tau)
-
-    def _needed(
-        self, node: Node, tau: Array, path: Path, other: Node
-    ) -> Iterator[tuple[Path, Node, Array, Array]]:
-        """Every node with its value and the one it should have."""
-        with np.errstate(all="ignore"):
-            t = self.values.of(node, keep=True)
-            if not np.isfinite(t).all() or not np.isfinite(tau).all():
-                return
-            yield path, node, t, tau
-            if node.kind == SUM:
-                for i, (sign, part) in enumerate(zip(node.data, node.parts, strict=True)):
-                    own = self.values.of(part, keep=True)
-                    yield from self._needed(part, sign * (tau - t) + own, (*path, i), other)
-            elif node.kind == PRODUCT:
-                for i, (e, part) in enumerate(zip(node.data, node.parts, strict=True)):
-                    own = self.values.of(part, keep=True)
-                    yield from self._needed(
-                        part, tau * own / t if e > 0 else own * t / tau, (*path, i), other
-                    )
-            elif node.kind in (POWER, CALL, MEAN):
-                yield from self._needed_inside(node, tau, path, other)
-
-    def _needed_inside(
-        self, node: Node, tau: Array, path: Path, other: Node
-    ) -> Iterator[tuple[Path, Node, Array, Array]]:
-        part = node.parts[0]
-        if node.kind == POWER and node.data.numerator % 2:
-            yield from self._needed(
-                part, np.sign(tau) * np.abs(tau) ** float(1 / node.data), (*path, 0), other
-            )
-            return
-        if node.kind == CALL and node.data in ("exp", "log"):
-            yield from self._needed(
-                part, np.log(tau) if node.data == "exp" else np.exp(tau), (*path, 0), other
-            )
-            return
-        for _, one in walk(other):  # the line above has one of the right value
-            if (
-                one.kind == node.kind
-                and one.data == node.data
-                and self._same(self.values.of(one, keep=True), tau)
-            ):
-                yield from self._needed(
-                    part, self.values.of(one.parts[0], keep=True), (*path, 0), one.parts[0]
-                )
-
-    def _told(self, path: Path, node: Node, t: Array, tau: Array) -> Iterator[Slip]:
-        """What the two values tell of the slip."""
-        in_sum = (
-            bool(path)
-            and at(self.line, path[:-1]).kind == SUM
-            and len(at(self.line, path[:-1]).parts) > 1
-        )
-        scale = np.abs(self.target) + np.abs(t)
-        if np.all(np.abs(tau) <= 1e-10 * scale):
-            if in_sum:
-                beside = at(self.line, path[:-1])
-                twice = any(
-                    i != path[-1]
-                    and sign == beside.data[path[-1]]
-                    and self._same(self.values.of(one), t)
-                    for i, (sign, one) in enumerate(zip(beside.data, beside.parts, strict=True))
-                )
-                yield Slip(
-                    "doubled" if twice else "extra", path, changed(self.line, path, number(0))
-                )
-            return
-        with np.errstate(all="ignore"):
-            ratio, rest = tau / t, tau - t
-        for kind, name, factor, extra in self._ratio(ratio, node):
-            yield Slip(
-                kind, path, changed(self.line, path, product(factor, node)), name, extra=extra
-            )
-        for wrong, right, order, (w, r) in self.moments:
-            if self._same(tau * w, t * r):
-                repaired = changed(
-                    self.line, path, product(node, right, wrong, exponents=(1, 1, -1))
-                )
-                yield Slip("moment", path, repaired, order=order)
-        yield from self._powers(path, node, tau)
-        if not in_sum:
-            yield from self._lost(path, node, rest)
-        if node.kind == CALL:
-            for name in ENTIRE:
-                other = Node(CALL, node.parts, name)
-                if name != node.data and self._same(self.values.of(other), tau):
-                    yield Slip("function", path, changed(self.line, path, other), node.data)
-
-    def _monomial(self, values: Array) -> tuple[Fraction, dict[str, int]] | None:
-        """q and powers of letters of which these are the values; None if of none."""
-        if not np.isfinite(values).all() or np.any(values == 0):
-            return None
-        powers = np.round((self.inverse @ np.log(np.abs(values)))[1:])
-        if np.abs(powers).max(initial=0) > 12:
-            return None
-        with np.errstate(all="ignore"):
-            found = values / np.prod(
-                [
-                    self.values.letter(name) ** k
-                    for name, k in zip(self.letters, powers, strict=True)
-                ],
-                axis=0,
-            )
-        q = Fraction(float(np.median(found))).limit_denominator(720)
-        if not q or not self._same(found, np.full_like(found, float(q))):
-            return None
-        return q, {name: int(k) for name, k in zip(self.letters, powers, strict=True) if k}
-
-    def _ratio(self, ratio: Array, node: Node) -> Iterator[tuple[str, str, Node, float]]:
-        """Kind of slip, letter, and the factor that is missing."""
-        found = self._monomial(ratio)
-        if found is None:
-            return
-        q, powers = found
-        factor = product(number(q), *(power(letter(name), k) for name, k in powers.items()))
-        own, size = letters(node), sum(map(abs, powers.values()))
-        if not powers:
-            yield (
-                ("sign" if q == -1 else "factor"),
-                "",
-                factor,
-                0.0 if max(abs(q.numerator), q.denominator) <= 60 else 1.0,
-            )
-        elif q == 1 and len(powers) == 1:
-            ((name, k),) = powers.items()
-            kind = "power" if name in own else "lost-factor" if k > 0 else "combined"
-            yield (
-                kind,
-                name,
-                factor,
-                (0.02 * (abs(k) - 1) if abs(k) <= 3 else 1.0) + 0.15 * _gone(node, name, k),
-            )
-        elif q == 1 and len(powers) == 2 and sum(powers.values()) == 0 and size <= 8:
-            wrong = min(powers, key=powers.__getitem__)
-            yield ("letter" if wrong in own else "combined"), wrong, factor, 0.02 * size
-        elif (
-            q == 1
-            and len(powers) == 2
-            and min(powers.values()) > 0
-            and size <= 4
-            and not own & set(powers)
-        ):
-            yield "lost-factor", " and ".join(powers), factor, 0.3
-        else:
-            yield "combined", "", factor, 0.1 * size
-
-    def _powers(self, path: Path, node: Node, tau: Array) -> Iterator[Slip]:
-        """A sum, a mean or a function in a wrong power."""
-        base, own = (node.parts[0], node.data) if node.kind == POWER else (node, Fraction(1))
-        if base.kind in (LETTER, NUMBER, PRODUCT):
-            return
-        for exponent in (1, 2, 3, 4, -1, -2, Fraction(1, 2)):
-            other = power(base, exponent)
-            if exponent != own and self._same(self.values.of(other), tau):
-                yield Slip("power", path, changed(self.line, path, other))
-
-    def _lost(self, path: Path, node: Node, rest: Array) -> Iterator[Slip]:
-        for one, term, value in self.could_be_lost:
-            for sign in (1, -1):
-                if self._same(sign * value, rest):
-                    repaired = changed(self.line, path, total(node, term, signs=(1, sign)))
-                    yield Slip("lost", path, repaired, lost=one, extra=-0.01)
-        if found := self._monomial(rest):
-            q, powers = found
-            if max(abs(q.numerator), q.denominator) <= 60:
-                one = product(number(q), *(power(letter(name), k) for name, k in powers.items()))
-                # in the sum where least is lost
-                extra = 0.02 * sum(map(abs, powers.values())) + 0.1 * (node.kind != SUM)
-                yield Slip(
-                    "lost",
-                    path,
-                    changed(self.line, path, total(node, one)),
-                    " and ".join(powers),
-                    extra=extra,
-                )
-
-    @cached_property
-    def could_be_lost(self) -> list[tuple[Node, Node, Array]]:
-        """Terms of the line above, or of a mean in it: the term, what would have to be added, and
-        the values of that."""
-        terms = [
-            one for path, one in walk(self.above) if path and at(self.above, path[:-1]).kind == SUM
-        ]
-        return [(one, new, self.values.of(new)) for one in terms for new in (one, mean(one))]
-
-    def _moment_pairs(self) -> Iterator[tuple[Node, Node, int, tuple[Array, Array]]]:
-        """Wrong and right moments of the normal law, with their values; of functions, too."""
-        law = self.setting.law
-        at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
-        for _, call in [*walk(self.line), *walk(self.above)]:
-            if call.kind == CALL and call.data in ENTIRE and letters(call) & set(law.states):
-                square, there = mean(power(call, 2)), replaced(call, at_mean)
-                for both in (
-                    (there, mean(call)),
-                    (power(there, 2), square),
-                    (power(mean(call), 2), square),
-                ):
-                    wrong, right = both[::-1] if self.mirrored else both
-                    yield wrong, right, 0, (self.values.of(wrong), self.values.of(right))
-        for i, x in enumerate(law.states):
-            m, moment = letter(law.means[i]), [mean(power(letter(x), k)) for k in range(9)]
-            for k in range(2, 9):
-                central = mean(power(difference(letter(x), m), k))
-                pairs = [(power(m, k), moment[k])]
-                if k % 2 == 0:
-                    pairs += [(central, moment[k]), (moment[k], central)]
-                if k in (4, 6, 8):
-                    square = power(moment[2], k // 2)
-                    pairs += [
-                        (square, moment[k]),
-                        (product(number({4: 3, 6: 15, 8: 105}[k]), square), moment[k]),
-                    ]
-                    pairs += [
-                        (power(letter(law.cov[i][i]), k // 2), one) for one in (central, moment[k])
-                    ]
-                if k == 4:
-                    pairs += [(moment[4], difference(moment[4], power(moment[2], 2)))]
-                for wrong, right in pairs:
-                    if self.mirrored:
-                        wrong, right = right, wrong
-                    yield wrong, right, k, (self.values.of(wrong), self.values.of(right))
-
-    # ---------------------------------------------------------------- noises
-
-    def noise(self) -> Iterator[Slip]:
-        """The line above with the mean square of a noise left out, or its mean taken as one."""
-        mine = self.values.of(self.line)
-        for name in self.setting.law.noises:
-            if name not in letters(self.above):
-                continue
-            for kind, value in (("noise-forgotten", 0), ("noise-mean", 1)):
-                other = replaced(self.above, {name: number(value)})
-                if self._same(self.values.of(other), mine) and self._equal(self.line, other):
-                    yield Slip(kind, (), self.above, name)
-
-    # ---------------------------------------------------------------- tried
-
-    def tried(self) -> Iterator[Slip]:
-        """Changes of one node inside a mean or a function, where what it should be does not
-        follow."""
-        count = 0
-        pool = sorted({*self.letters, *letters(self.line), *letters(self.above)})
-        terms = [
-            one
-            for where, one in walk(self.above)
-            if where and at(self.above, where[:-1]).kind == SUM
-        ]
-        for path, node in walk(self.line):
-            if not any(
-                at(self.line, path[:i]).kind in (MEAN, CALL, POWER) for i in range(len(path))
-            ):
-                continue
-            for kind, name, new in _changes(node, pool, terms):
-                count += 1
-                if count > MOST_TRIED:
-                    return
-                other = changed(self.line, path, new)
-                if self._same(self.values.of(other), self.target) and not self._nothing(
-                    other, path, kind
-                ):
-                    yield Slip(kind, path, other, name)
-
-    def _nothing(self, line: Node, path: Path, kind: str) -> bool:
-        """Whether a change leaves nothing of the mean or the power around it: then that does not
-        belong there as a whole.
-
-        With a noise that was lost a mean may be zero, and rightly so.
-        """
-        outer = at(
-            line,
-            next(
-                path[:i] for i in range(len(path)) if at(line, path[:i]).kind in (MEAN, CALL, POWER)
-            ),
-        )
-        return bool(
-            np.all(
-                np.abs(self.values.of(outer.parts[0] if kind == "lost-factor" else outer)) <= 1e-9
-            )
-        )
-
-    # ---------------------------------------------------------------- of the line above
-
-    def misread(self) -> Iterator[Slip]:
-        """What was made of one term of the line above, spread over several terms of this one."""
-        for slip in _Search(self.setting, self.above, self.line, mirrored=True).solved():
-            a_mean = at(self.above, slip.path).kind == MEAN and slip.kind in (
-                "sign",
-                "factor",
-                "power",
-                "letter",
-            )
-            if (slip.kind == "moment" or a_mean) and self._equal(slip.repaired, self.line):
-                yield Slip(slip.kind, slip.path, self.above, slip.name, slip.order, above=True)
-
-
-def _sign(root: Node, path: Path) -> int:
-    """Of a term, in its sum."""
-    return at(root, path[:-1]).data[path[-1]]
-
-
-def _gone(node: Node, name: str, k: int) -> bool:
-    """Whether nothing is left of a letter, or its power, times another power of it."""
-    base, own = (node.parts[0], node.data) if node.kind == POWER else (node, 1)
-    return base.kind == LETTER and base.data == name and own + k == 0
-
-
-def _changes(
-    node: Node, pool: Sequence[str], terms: Sequence[Node]
-) -> Iterator[tuple[str, str, Node]]:
-    """Changes of one node: kind of slip, letter, the new node."""
-    if node.kind == SUM:
-        for i in range(len(node.parts)):
-            signs = tuple(-s if i == j else s for j, s in enumerate(node.data))
-            yield "sign", "", Node(SUM, node.parts, signs)
-            if len(node.parts) > 1:
-                rest = [j for j in range(len(node.parts)) if j != i]
-                yield (
-                    "extra",
-                    "",
-                    Node(
-                        SUM, tuple(node.parts[j] for j in rest), tuple(node.data[j] for j in rest)
-                    ),
-                )
-    if node.kind == LETTER:
-        yield from (("letter", node.data, letter(name)) for name in pool if name != node.data)
-    if node.kind == POWER:
-        yield from (
-            ("power", _name(node.parts[0]), power(node.parts[0], k))
-            for k in (1, 2, 3, 4, 5, 6)
-            if k != node.data
-        )
-    elif node.kind != NUMBER:
-        yield from (("power", _name(node), power(node, k)) for k in (2, 3))
-    if node.kind == CALL:
-        yield from (
-            ("function", node.data, Node(CALL, node.parts, name))
-            for name in ENTIRE
-            if name != node.data
-        )
-    yield from (
-        ("factor", "", product(number(q), node))
-        for q in map(Fraction, ("2", "1/2", "3", "1/3", "4", "1/4", "6", "1/6"))
-    )
-    if node.kind == PRODUCT:
-        for i, one in enumerate(node.parts):
-            inner = tuple(number(1) if i == j else part for j, part in enumerate(node.parts))
-            yield "extra", _name(one), Node(PRODUCT, inner, node.data)
-    yield from (("lost-factor", name, product(letter(name), node)) for name in pool)
-    yield from (
-        ("lost", "", total(node, one, signs=(1, sign))) for one in terms for sign in (1, -1)
-    )
-
-
-def _name(node: Node) -> str:
-    return node.data if node.kind == LETTER else ""
+def _of_noise(slip: Slip) -> bool:
+    return slip.kind.startswith("noise")

@@ -2,21 +2,20 @@
 
 kalman                  the textbook step
 base, designed          what a filter is: ready to run, or with coefficients to be found over an
-ensemble
+                        ensemble
 approximations          approximations of the absolutely optimal filter (AOF): EKF, normal,
-unscented, quadrature
+                        unscented, quadrature
 conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps
-(DFMP, MDFMP), and those
-                        with the last measurements (FKP) or the last estimates (FBP) in the place of
-                        the last one
+                        (DFMP, MDFMP), and those with the last measurements (FKP) or the last
+                        estimates (FBP) in the place of the last one
 exact                   the AOF itself, of scalar models with modes or without, compiled: a folder
 looking_back            what the whole record tells of each state (exact, particles have ways of
-their own)
+                        their own)
 particles               the same by sampling, with modes or without;  densities: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, robustness        measurements that are not believed: refused, by any filter; weighted; a
-noise of unknown size, learnt
+                        noise of unknown size, learnt
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
                         (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes)

@@ -10,18 +10,19 @@ The exact filter would keep one normal law for each history of modes, M^k of the
 merge them once a step, a mixture into the normal law with its mean and covariance.  With mu_j the
 probability of mode j after y_k, c_j before it:
 
-    correct   z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;
-        mu_j = c_j L_j / sum_i c_i L_i
+    correct     z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;
+                mu_j = c_j L_j / sum_i c_i L_i
     combine     z = sum mu_j z_j,   p = sum mu_j (p_j + (z_j - z)(z_j - z)^T)
     chain       c_j = sum_i pi_ij mu_i,   mu_i|j = pi_ij mu_i / c_j
 
 and then they differ by when they merge:
 
-    `imm`   before a prediction, the laws of the modes that may lead to j: tau_j, Theta_j of the
-        mixture
-    `logic_dynamic`   after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)
-        (логико-динамический АОФ)
-    `gpb2`   after the next correction, J^2 laws in between (generalised pseudo-Bayes of order 2)
+    `imm`               the laws of the modes that may lead to j, before a prediction: tau_j,
+                        Theta_j of the mixture
+    `logic_dynamic`     after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)
+                        (логико-динамический АОФ)
+    `gpb2`              after the next correction, J^2 laws in between (generalised pseudo-Bayes of
+                        order 2)
 
 The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan
 (2001), section 11.6; for the second Rudenko's logic-dynamic filters.
@@ -29,11 +30,12 @@ The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shal
 Transitions may depend on the state, pi_ij(x).  With the law N(z, p) of x_k in mode i, Bayes'
 formula for the next mode gives
 
-    nu_ij = M_N[pi_ij(x)]             how probable j is
-    z_ij  = M_N[x pi_ij(x)] / nu_ij   the law of x_k, given that j comes next: N weighted by pi_ij,
-    p_ij  = M_N[(x - z_ij)(x - z_ij)^T pi_ij(x)] / nu_ij       taken for a normal one
+    nu_ij = M_N[pi_ij(x)]                                    how probable j is
+    z_ij  = M_N[x pi_ij(x)] / nu_ij                          the law of x_k, given that j comes
+    p_ij  = M_N[(x - z_ij)(x - z_ij)^T pi_ij(x)] / nu_ij     next: N weighted by pi_ij
 
-which takes the places of pi_ij and (z_i, p_i) before a prediction; for affine a that is exact.  The
+which, taken for a normal law, takes the places of pi_ij and (z_i, p_i) before a prediction; for
+affine a that is exact.  The
 means are found by Gauss-Hermite quadrature over the components that pi_ij contains, which a jump of
 pi_ij deceives by some per cent; the other components follow by regression on these.
 """

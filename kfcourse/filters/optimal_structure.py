@@ -10,10 +10,10 @@ whole ensemble, found off-line: on-line the filter carries no covariance equatio
 the filter:
 
 `Memory`   zeta: the last estimates, the last measurements, or both.  The FOS has the order of the
-object: its estimate is
-           z_k = M[x_k | y_k, z_{k-1}], so all it carries from step to step is z;
+           object: its estimate is z_k = M[x_k | y_k, z_{k-1}], so all it carries from step to step
+           is z;
 `Recipe`   which parts of the two steps are left to structural functions, and which are corrected by
-a regression.
+           a regression.
 
 Where the FOS trusts its approximate structural functions, the modified filters let a regression
 over the ensemble correct them: since "change nothing" is among the admissible coefficients, each
@@ -30,8 +30,8 @@ all.
 Those that remember more than the last estimate; FKP and DFKP are the school's, the others come of
 the construction:
 
-    FKP, MFKP, DFKP, MDFKP   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})
-        the recipes of FOS, MFOS, DFMP, MDFMP
+    FKP, MFKP, DFKP, MDFKP   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})     the recipes of FOS, MFOS,
+                             DFMP, MDFMP
     FBP                      zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})     the recipe of the FOS
 
 With measurements z is not fed back: what older ones knew is lost, and so are their errors.  Until

@@ -5,15 +5,14 @@ variants     `Variant`, read from variants.toml or a file like it
 admission    which filters a model admits, and why not
 families     what each family of filters is called, in both languages, and how it is drawn
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables;  checked_quadrature:
-where there are no formulas
+             where there are no formulas
 quality      is a variant well posed?  grammar: new ones, from the pieces of grammar.toml
 maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes, in English or Russian (report.toml): report_sections, the
-comparison and the conclusion;
-             report_plain, report_modes: task, functions and filters of models without and with
-             modes; report_text: numbers and sentences; written_out: the AOF's equations with the
-             model's functions in them
+             comparison and the conclusion; report_plain, report_modes: task, functions and filters
+             of models without and with modes; report_text: numbers and sentences; written_out: the
+             AOF's equations with the model's functions in them
 own_data     what `kfcourse estimate` writes of a record from a file
 """
 

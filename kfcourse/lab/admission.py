@@ -78,16 +78,13 @@ class Admission:
 
 
 def admissions(
-    model: Model | JumpModel,
-    names: Sequence[str] | None = None,
-    seconds: float | None = None,
-    known: Sequence[Admission] = (),
+    model: Model | JumpModel, names: Sequence[str] | None = None, seconds: float | None = None
 ) -> list[Admission]:
     """Which of the filters, all by default, can be built for the model, and what to know of them;
     each as the lab builds it.
 
-    With `seconds`, the formulas of each must be derived in that time.  What is `known` of a filter
-    is not asked again.
+    With `seconds`, the formulas of each must be derived in that time; filters with the same
+    structural functions share the time.
 
     Raises
     ------
@@ -98,24 +95,19 @@ def admissions(
     names = list(dict.fromkeys(entries if names is None else names))
     check_names(names, entries)
     structures = JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)
-    answers = {answer.name: answer for answer in known}
+    answers, late = [], set()
     for name in names:
-        if name in answers:
-            continue
-        # filters with the same structural functions share the time
-        late = [a for a in answers.values() if getattr(a.reason, "kind", "") == "too_long"]
-        reason = next(
-            (a.reason for a in late if entries[a.name].functions == entries[name].functions), None
-        )
-        if reason is None:
-            try:
-                with nullcontext() if seconds is None else time_limit(seconds):
-                    answers[name] = _admitted(name, entries[name], structures)
-                continue
-            except OutOfTime:
-                reason = Refused(TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
-        answers[name] = Admission(name, None, reason)
-    return [answers[name] for name in names]
+        functions = entries[name].functions
+        try:
+            if functions in late:
+                raise OutOfTime
+            with nullcontext() if seconds is None else time_limit(seconds):
+                answers.append(_admitted(name, entries[name], structures))
+        except OutOfTime:
+            late.add(functions)
+            reason = Refused(TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
+            answers.append(Admission(name, None, reason))
+    return answers
 
 
 def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) -> Admission:
@@ -173,23 +165,22 @@ def _blind(structures: Structures) -> Iterator[str]:
                 full = gauss_hermite(model, 7)
             except ModelError:
                 return
-        points = unscented(model)
-    seen, there = (
-        [now.measure(*model.prior).R, now.predict(*model.prior).cov]
-        for now in (points.at(0), full.at(0))
-    )
-    for what, part, whole in zip(
-        ("the measurement that the state does not explain", "the next state"),
-        seen,
-        there,
-        strict=True,
+        points, full = unscented(model).at(0), full.at(0)
+    law = model.prior
+    for what, part, whole in (
+        (
+            "the measurement that the state does not explain",
+            points.measure(*law).R,
+            full.measure(*law).R,
+        ),
+        ("the next state", points.predict(*law).cov, full.predict(*law).cov),
     ):
         share = np.diagonal(np.broadcast_to(part, whole.shape)) / np.diagonal(whole)
         if (worst := np.nanmin(share, initial=1.0)) < BLIND:
             yield (
                 f"its points lie on the axes and see {100 * max(worst, 0.0):.0f} % of the "
-                f"variance of {what} at the prior law: "
-                "products such as x**2*w are 0 on them; aof-gauss-hermite sees them"
+                f"variance of {what} at the prior law: products such as x**2*w are 0 on them; "
+                "aof-gauss-hermite sees them"
             )
 
 
@@ -197,7 +188,5 @@ def table(answers: Sequence[Admission]) -> str:
     """What `kfcourse filters` prints: a line for each filter."""
     rows = [(answer.name, title(answer.name), answer.verdict, answer.says) for answer in answers]
     widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:3]]
-    return "\n".join(
-        "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]).rstrip()
-        for row in rows
-    )
+    form = "  ".join(f"{{:{width}}}" for width in widths)
+    return "\n".join(f"{form.format(*row)}  {row[3]}".rstrip() for row in rows)

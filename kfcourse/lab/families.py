@@ -15,7 +15,7 @@ class Family(NamedTuple):
 
     title, russian            in tables: "FOS", "ФОС"
     heading, russian_heading  of the section with its equations in reports; "" if `EQUATIONS` has
-    none of it
+                              none of it
     colour, marker            Matplotlib's
     """
 

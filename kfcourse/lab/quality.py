@@ -29,8 +29,7 @@ import sympy as sp
 from tqdm import tqdm
 
 from kfcourse.errors import NoClosedForm, NotFinite
-from kfcourse.filters import Design, Filter
-from kfcourse.filters.base import State, initial_state
+from kfcourse.filters import Design
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import LAB, Structures, title
 from kfcourse.lab.variants import RUNS, Variant
@@ -57,7 +56,6 @@ UNSEEN = 0.9
 SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
-UNMEASURED = "without measurements"
 CRITERIA = ("bounded", "observable", "filters differ", "solvable")
 
 
@@ -133,18 +131,15 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
             return Quality(variant.name, {"solvable": Finding(False, late)})
         if answers.ok and ask:
             answers = ask(variant) or answers
-        size = runs if model.n == 1 else max(runs // VECTOR, FEWEST)
-        x = simulate(model, size, variant.steps, seed).x
-        decays = (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any()
+        x = simulate(
+            model, runs if model.n == 1 else max(runs // VECTOR, FEWEST), variant.steps, seed
+        ).x
         linear = model.between is None and is_linear(model)
-        remarks = {"linear: the Kalman filter is exact": linear, "decays to a constant": decays}
+        remarks = ["linear: the Kalman filter is exact"] * linear
+        if (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any():
+            remarks.append("decays to a constant")
         findings = _simulated(model, x, seed) | {"solvable": answers}
-        return Quality(
-            variant.name,
-            findings,
-            linear,
-            tuple(remark for remark, holds in remarks.items() if holds),
-        )
+        return Quality(variant.name, findings, linear, tuple(remarks))
 
 
 def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
@@ -157,25 +152,21 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
         larger: dict[str, Any] = {
             name: Gaussian(law.mean, STRESS**2 * law.cov) for name, law in laws.items()
         }
-        if not np.isfinite(
-            simulate(dataclasses.replace(model, **larger), runs, steps, seed).x
-        ).all():
+        far = simulate(dataclasses.replace(model, **larger), runs, steps, seed).x
+        if not np.isfinite(far).all():
             rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"
             moments = Finding(False, f"{rare}, so a few of very many will", moments.value)
     if not moments.ok or not filters:
         return {"bounded": moments}
     try:
-        result = compare(
-            [*filters, unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False
-        )
+        result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
+    designed = [built.name for built in filters if isinstance(built, Design)]
     return {
-        "bounded": not_diverging(result) or moments,
+        "bounded": not_diverging(result, x) or moments,
         "observable": observable(result, x),
-        "filters differ": differences(
-            result, [built.name for built in filters if isinstance(built, Design)]
-        ),
+        "filters differ": differences(result, designed),
     }
 
 
@@ -207,28 +198,24 @@ def table(qualities: Sequence[Quality]) -> str:
     """What `kfcourse variants --check` prints: a line for each variant, then what is not well
     posed."""
     rows = [("variant", *CRITERIA, "remarks"), *map(_row, qualities)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+    form = "  ".join(f"{{:{max(map(len, column))}}}" for column in zip(*rows, strict=True))
     reasons = [
-        f"variant {q.name} is not well posed, {fault}: {why}"
-        for q in qualities
-        for fault, why in q.faults.items()
+        f"variant {quality.name} is not well posed, {fault}: {why}"
+        for quality in qualities
+        for fault, why in quality.faults.items()
     ]
+    lines = [form.format(*row).rstrip() for row in rows]
     return "\n".join([*lines, LEGEND, *([""] if reasons else []), *reasons])
 
 
 def _row(quality: Quality) -> tuple[str, ...]:
     cells = []
     for name in CRITERIA:
-        finding = quality.findings.get(name, NOT_EXAMINED)
-        cell = {True: "yes", False: "NO", None: "-"}[finding.ok]
-        if name == "filters differ" and quality.linear and not finding.ok:
-            cell = "equal"
-        elif name in ("observable", "filters differ") and finding.value > 0:
-            cell += f" {100 * finding.value:.3g} %"
+        ok, _, value = quality.findings.get(name, NOT_EXAMINED)
+        equal = name == "filters differ" and quality.linear and not ok
+        cell = "equal" if equal else {True: "yes", False: "NO", None: "-"}[ok]
+        if name in ("observable", "filters differ") and value > 0:
+            cell += f" {100 * value:.3g} %"
         cells.append(cell)
     return quality.name, *cells, "; ".join(quality.remarks)
 
@@ -244,9 +231,8 @@ def bounded(x: Array) -> Finding:
     """
     finite = np.isfinite(x**4).all(axis=(1, 2))
     if not finite.all():
-        return Finding(
-            False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf")
-        )
+        when = f"trajectories become infinite (step {int(np.argmin(finite))})"
+        return Finding(False, when, float("inf"))
     square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
     # of a single step 0
     growth = float(
@@ -255,19 +241,15 @@ def bounded(x: Array) -> Finding:
     grows = (
         f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
     )
-    if growth > GROWTH:
-        return Finding(False, grows, growth)
     u = x - x.mean(axis=1, keepdims=True)
     carriers = ratio((u**2).sum(axis=1) ** 2, (u**4).sum(axis=1), CARRIERS)[varies(x)].min(
         initial=np.inf
     )
-    if carriers < CARRIERS:
-        few = (
-            f"the second moment is that of {carriers:.1f} trajectories of {x.shape[1]}: too "
-            f"heavy tails"
-        )
-        return Finding(False, few, growth)
-    return Finding(True, grows, growth)
+    few = (
+        f"the second moment is that of {carriers:.1f} trajectories of {x.shape[1]}: too heavy tails"
+    )
+    fits = carriers >= CARRIERS or growth > GROWTH
+    return Finding(growth <= GROWTH and fits, grows if fits else few, growth)
 
 
 def varies(x: Array) -> Array:
@@ -276,54 +258,30 @@ def varies(x: Array) -> Array:
     return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
 
 
-def unmeasured(model: Model, x: Array) -> Filter:
-    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs,
-    n)."""
-    means = x.mean(axis=1)
-    u = x - means[:, None]
-    covs = np.einsum("kri,krj->kij", u, u) / x.shape[1]
-
-    def step(state: State, y: Array) -> State:
-        law = Gaussian(np.tile(means[state.step], (len(y), 1)), covs[state.step])
-        return State(state.step + 1, law, law)
-
-    return Filter(UNMEASURED, model, initial_state(model), step)
-
-
-def measured(comparison: Comparison) -> list[str]:
-    """Names of the filters that use the measurements."""
-    return [name for name in comparison.names if name != UNMEASURED]
-
-
-def shares(comparison: Comparison, name: str) -> Estimate:
-    """Error variance of a filter over that without measurements, mean over the steps, for each
-    component: (n,).
+def shares(comparison: Comparison, name: str, x: Array) -> Estimate:
+    """Error variance of a filter over that without measurements, the variance of trajectories x
+    (steps, runs, n); mean over the steps, for each component: (n,).
 
     Steps where the component does not vary are left out; a component that never varies has the
     share 1.
     """
-    squares = comparison.sums.means("square")
-    square, base = (squares[comparison.names.index(key)] for key in (name, UNMEASURED))
-    used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
-    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(
-        used.sum(axis=0), 1
-    )
-    return Estimate.jackknife(np.where(used.any(axis=0), share, 1.0))
+    base = x.var(axis=1)
+    used = base > 1e-24 * base.max(axis=0)
+    squares = comparison.sums.means("square")[comparison.names.index(name)]
+    share = np.where(used[..., None], ratio(squares, base[..., None], 0.0), 0.0).sum(axis=0)
+    count = used.sum(axis=0)[:, None]
+    return Estimate.jackknife(np.where(count > 0, share / np.maximum(count, 1), 1.0))
 
 
-def not_diverging(comparison: Comparison) -> Finding | None:
+def not_diverging(comparison: Comparison, x: Array) -> Finding | None:
     """The filter that is DIVERGED times worse than no measurements; None if there is none."""
     worst, name = max(
-        (float(shares(comparison, name).value.max()), name) for name in measured(comparison)
+        (float(shares(comparison, name, x).value.max()), name) for name in comparison.names
     )
     if worst <= DIVERGED:
         return None
-    return Finding(
-        False,
-        f"{title(name)} diverges: its error variance is {worst:.3g} times that without "
-        f"measurements",
-        worst,
-    )
+    claim = f"its error variance is {worst:.3g} times that without measurements"
+    return Finding(False, f"{title(name)} diverges: {claim}", worst)
 
 
 def observable(comparison: Comparison, x: Array) -> Finding:
@@ -332,24 +290,17 @@ def observable(comparison: Comparison, x: Array) -> Finding:
 
     The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN.
     """
-    estimates = [shares(comparison, name) for name in measured(comparison)]
+    estimates = [shares(comparison, name, x) for name in comparison.names]
     upper = np.min([share.value + 4 * share.standard_error for share in estimates], axis=0)
-    worst = int(np.argmax(upper))
-    names = comparison.model.x
+    worst, names = int(np.argmax(upper)), comparison.model.x
     share = float(min(estimate.value[worst] for estimate in estimates))
     constant = ~varies(x).any(axis=0)
     if constant.any():
-        return Finding(
-            False,
-            f"{names[int(np.argmax(constant))]} does not vary, there is nothing to estimate",
-            share,
-        )
+        still = f"{names[int(np.argmax(constant))]} does not vary, there is nothing to estimate"
+        return Finding(False, still, share)
     left = f"the best filter leaves {100 * share:.3g} % of the variance of {names[worst]}"
-    return (
-        Finding(True, left, share)
-        if upper[worst] < UNSEEN
-        else Finding(False, f"the meter hardly tells: {left}", share)
-    )
+    ok = bool(upper[worst] < UNSEEN)
+    return Finding(ok, left if ok else f"the meter hardly tells: {left}", share)
 
 
 def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
@@ -362,7 +313,7 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value:
     the largest significant difference, relative to the error variance of the control.
     """
-    pairs = list(combinations(measured(comparison), 2))
+    pairs = list(combinations(comparison.names, 2))
     tests = max(len(pairs), 1) * (comparison.steps + 1)
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
     control = comparison.error_variance(comparison.control).value
@@ -377,9 +328,9 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
         error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
         quantile = scipy.special.stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
         allowed = quantile * error + ROUNDING + (0.0 if set(pair).isdisjoint(designed) else fitted)
-        significant = np.where(relative > allowed, relative, 0.0)
-        if significant.max() > largest:
-            largest, step = float(significant.max()), int(significant.argmax())
+        step = int(np.argmax(significant := np.where(relative > allowed, relative, 0.0)))
+        if significant[step] > largest:
+            largest = float(significant[step])
             when = f"at step {step}" if step < comparison.steps else "on average"
             says = f"{' and '.join(map(title, pair))} differ by {100 * largest:.2g} % {when}"
     return Finding(largest > 0, says, largest)
@@ -393,10 +344,7 @@ def solvable(structures: Structures) -> Finding:
         _ = structures.linearised
     except NoClosedForm as error:
         return Finding(False, str(error))
-    operations = sum(int(formula.count_ops()) for formula in sp.flatten(parts))
-    says = f"closed form, {operations} operations in the Gaussian structural functions"
-    return Finding(
-        operations <= LONGEST,
-        says + ("" if operations <= LONGEST else f", more than {LONGEST}"),
-        float(operations),
-    )
+    count = sum(int(formula.count_ops()) for formula in sp.flatten(parts))
+    says = f"closed form, {count} operations in the Gaussian structural functions"
+    too_long = f", more than {LONGEST}" if count > LONGEST else ""
+    return Finding(not too_long, says + too_long, float(count))

@@ -3,11 +3,11 @@ consistency.
 
 system        `LinearSystem`: A, H, Q, R, B, checked
 arithmetic    one correction and prediction in five forms: textbook, symmetrised, Joseph, square
-root, UD
+              root, UD
 factored      the UD form: factors of the covariance instead of it
 runs          the filter along stored measurements; simulation
 smoothing     the same looked back upon: Rauch, Tung and Striebel's backward pass, which every
-smoother shares
+              smoother shares
 em            Q and R from a record, by expectation and maximisation
 accuracy      covariances in advance, for any gains; the steady state of the Riccati equation
 consistency   NEES, NIS, whiteness, confidence ellipses: is a filter right about its own errors?

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian, correct, gain, symmetric
 from kfcourse.linear.system import LinearSystem
 
@@ -43,23 +42,18 @@ def covariances(
     ValueError
         Shapes that do not fit, or no steps.
     """
-    expect_sizes(steps=steps)
     n, p, cov = len(system.A), len(system.H), np.asarray(prior_cov, dtype=float)
-    if cov.shape != (n, n):
-        raise ValueError(f"the prior's covariance must have the shape ({n}, {n}), got {cov.shape}")
-    if gains is not None and np.shape(gains) not in ((n, p), (steps, n, p)):
+    if cov.shape != (n, n) or (gains is not None and np.shape(gains)[-2:] != (n, p)):
         raise ValueError(
-            f"gains must have the shape ({steps}, {n}, {p}) or ({n}, {p}), got {np.shape(gains)}"
+            f"expected a covariance ({n}, {n}) and gains ({n}, {p}) or ({steps}, {n}, {p}), got "
+            f"{cov.shape} and {None if gains is None else np.shape(gains)}"
         )
     given = None if gains is None else np.broadcast_to(gains, (steps, n, p))
     rows = []
     for k in range(steps):
-        K = (
-            gain(cov @ system.H.T, system.measure(np.zeros(len(cov)), cov).F)
-            if given is None
-            else given[k]
-        )
-        rest = np.eye(len(cov)) - K @ system.H
+        optimal = gain(cov @ system.H.T, system.measure(np.zeros(n), cov).F)
+        K = optimal if given is None else given[k]
+        rest = np.eye(n) - K @ system.H
         posterior = symmetric(rest @ cov @ rest.T + K @ system.R @ K.T)
         rows.append((cov, posterior, K))
         cov = symmetric(system.A @ posterior @ system.A.T + system.Q)

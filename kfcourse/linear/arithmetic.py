@@ -2,12 +2,12 @@
 
 All five are the same filter on paper.  They differ in what rounding does to the covariance:
 
-    `covariance`   P = (I - K H) P^-                          as in the textbook; may
-                   turn asymmetric or negative
+    `covariance`   P = (I - K H) P^-                          as in the textbook; may turn
+                   asymmetric or negative
     `symmetrised`  the same, then (P + P^T) / 2               symmetric, may still be negative
     `joseph`       P = (I - K H) P^- (I - K H)^T + K R K^T    a sum of non-negative terms
-    `square-root`  S with P = S S^T, by orthogonal transformations; P is never formed.
-                   R must be positive definite
+    `square-root`  S with P = S S^T, by orthogonal transformations; P is never formed.  R must be
+                   positive definite
     `ud`           U, D with P = U D U^T, without square roots; see `factored`
 """
 

@@ -63,13 +63,8 @@ def _round(system: LinearSystem, prior: Gaussian, y: Array, measured: Array) -> 
     S = gain(product(found.posterior.cov[:-1], transpose(A)), found.predicted.cov[1:])
     together = product(A, product(S, p[1:]))  # A Cov(x_k, x_{k+1})
     v = x[1:] - apply(A, x[:-1])
-    squares = (
-        _square(v)
-        + p[1:]
-        - together
-        - transpose(together)
-        + product(product(A, p[:-1]), transpose(A))
-    )
+    before = product(product(A, p[:-1]), transpose(A))
+    squares = _square(v) + p[1:] - together - transpose(together) + before
     w = (y - apply(H, x))[measured]
     errors = _square(w) + product(product(H, p[measured]), transpose(H))
     return replace(system, Q=symmetric(squares.mean(axis=(0, 1))), R=symmetric(errors.mean(axis=0)))

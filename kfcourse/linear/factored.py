@@ -108,10 +108,8 @@ def bierman(
     v = diagonal * f
     # a measurement may be missing in some runs only
     lead = np.broadcast_shapes(v.shape[:-1], noise.shape)
-    unit, diagonal = (
-        np.broadcast_to(one, lead + one.shape[-size:]).copy()
-        for one, size in ((unit, 2), (diagonal, 1))
-    )
+    unit = np.broadcast_to(unit, lead + unit.shape[-2:]).copy()
+    diagonal = np.broadcast_to(diagonal, lead + diagonal.shape[-1:]).copy()
     before, K = np.broadcast_to(noise, lead), np.zeros_like(diagonal)
     for j in range(v.shape[-1]):
         after = before + f[..., j] * v[..., j]

@@ -69,12 +69,11 @@ def run(
         finite.
     """
     chosen = form(arithmetic, system)
-    if y.ndim != 3 or y.shape[2] != len(system.H):
+    if y.ndim != 3 or y.shape[2] != len(system.H) or not y.size or np.isinf(y).any():
         raise ValueError(
-            f"measurements must have the shape (steps, runs, {len(system.H)}), got {y.shape}"
+            f"measurements must be finite and have the shape (steps, runs, {len(system.H)}), with "
+            f"NaN where one is missing; got {y.shape}, {int(np.isinf(y).sum())} of them infinite"
         )
-    if not y.size or np.isinf(y).any():
-        raise ValueError("measurements must be there, and finite: write NaN where one is missing")
     runs, n, dtype = y.shape[1], len(system.A), system.A.dtype
     _check_input(system, u, len(y), runs)
     check_prior(prior, runs, n)
@@ -92,35 +91,26 @@ def run(
 
 
 def _check_input(system: LinearSystem, u: Array | None, steps: int, runs: int) -> None:
-    if u is None:
-        return
-    if system.B is None:
-        system.input(u)  # says what to do
+    if u is None or system.B is None:
+        system.input(u)  # says what to do where there is no B
         return
     m = system.B.shape[1]
-    if u.ndim != 3 or len(u) != steps or u.shape[1] not in (1, runs) or u.shape[2] != m:
+    if u.shape not in ((steps, runs, m), (steps, 1, m)) or not np.isfinite(u).all():
         raise ValueError(
-            f"inputs must have the shape ({steps}, {runs}, {m}), or ({steps}, 1, {m}) for all "
-            f"runs; got {u.shape}"
-        )
-    if not np.isfinite(u).all():
-        raise ValueError(
-            "inputs must be finite: give a missing input the value that the object had, or its "
-            "mean with a larger Q"
+            f"inputs must be finite and have the shape ({steps}, {runs}, {m}), or ({steps}, 1, "
+            f"{m}) for all runs; got {u.shape}: give a missing input the value that the object "
+            "had, or its mean with a larger Q"
         )
 
 
 def check_prior(prior: Gaussian, runs: int, n: int) -> None:
     """ValueError unless this is a law of n components, for each of so many runs or for all."""
     mean, cov = np.shape(prior.mean), np.shape(prior.cov)
-    if mean not in ((n,), (1, n), (runs, n)):
+    shapes = (n,), (1, n), (runs, n)
+    if mean not in shapes or cov not in [(*shape, n) for shape in shapes]:
         raise ValueError(
-            f"the prior's mean must have the shape ({n},) or ({runs}, {n}), got {mean}"
-        )
-    if cov not in ((n, n), (1, n, n), (runs, n, n)):
-        raise ValueError(
-            f"the prior's covariance must have the shape ({n}, {n}) or ({runs}, {n}, {n}), got "
-            f"{cov}"
+            f"the prior's mean must have the shape ({n},) or ({runs}, {n}), its covariance ({n}, "
+            f"{n}) or ({runs}, {n}, {n}); got {mean} and {cov}"
         )
     if not (np.isfinite(prior.mean).all() and np.isfinite(prior.cov).all()):
         raise ValueError(

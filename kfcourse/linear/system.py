@@ -49,37 +49,28 @@ class LinearSystem:
 
     def __post_init__(self) -> None:
         for name in "AHQRB":
-            value = getattr(self, name)
-            if value is None:
-                continue
-            array = np.asarray(value)
-            array = array if array.dtype == np.float32 else array.astype(float)
-            if array.ndim != 2:
-                raise ValueError(f"{name} must be a matrix (2 axes), got the shape {array.shape}")
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} must be finite, got {array.tolist()}")
-            object.__setattr__(self, name, array)
+            if (value := getattr(self, name)) is not None:
+                array = np.asarray(value)
+                array = array if array.dtype == np.float32 else array.astype(float)
+                object.__setattr__(self, name, array)
         n, p = len(self.A), len(self.H)
         shapes = {"A": (n, n), "H": (p, n), "Q": (n, n), "R": (p, p)}
+        if self.B is not None:
+            shapes["B"] = (n, *self.B.shape[1:2])
         for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
+            array = getattr(self, name)
+            if array.shape != shape or array.ndim != 2 or not np.isfinite(array).all():
                 raise ValueError(
-                    f"{name} has the shape {getattr(self, name).shape}; with {n} states and {p} "
-                    f"measurements it is {shape}"
+                    f"{name} must be a finite matrix, with {n} states and {p} measurements of the "
+                    f"shape {shape}; got {array.tolist()}"
                 )
-        if self.B is not None and len(self.B) != n:
-            raise ValueError(f"B has {len(self.B)} rows; with {n} states it has {n}")
         for name in "QR":
             cov = getattr(self, name)
-            if not np.array_equal(cov, cov.T):
-                raise ValueError(
-                    f"{name} is a covariance and must be symmetric, got {cov.tolist()}"
-                )
             values = np.linalg.eigvalsh(cov)
             # rounding of eigvalsh, in float32 too
-            if values.min() < -1e-6 * max(values.max(), 0.0):
+            if not np.array_equal(cov, cov.T) or values.min() < -1e-6 * max(values.max(), 0.0):
                 raise ValueError(
-                    f"{name} is a covariance and must not be negative, got {cov.tolist()}"
+                    f"{name} is a covariance: symmetric and not negative; got {cov.tolist()}"
                 )
 
     def astype(self, dtype: Any) -> LinearSystem:

@@ -3,11 +3,11 @@
 ensemble    the trajectories that a seed stands for
 designing   coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment  `run`, `predictions`, `compare`: all filters, the exact one too, on the same batches of
-trajectories
+            trajectories
 scores      how good predictions of measurements are, doubt and all
 statistics  means over batches, and the jackknife over them
 comparison  `Comparison`: error variances, paired differences, ranking, distance from the exact
-filter
+            filter
 modes       how well filters know the mode of a model that jumps
 cramer_rao  `posterior_bound`: what no filter can beat, without running one
 parallel    threads of this machine, or the workers of a Dask scheduler

@@ -18,15 +18,15 @@ from kfcourse.symbolic.structure import Structure
 
 
 def scored(
-    one: Filter, structure: Structure, before: State, y: Array, after: State
+    chosen: Filter, structure: Structure, before: State, y: Array, after: State
 ) -> tuple[Array, Array]:
     """Both scores of the measurement y (runs, p) for each trajectory, (runs,), by the filter's own
     structural functions, or these; NaN for the second where the prediction is not a normal law."""
-    if one.evidence is not None:
-        return one.evidence(before, y, after), np.full(len(y), np.nan)
+    if chosen.evidence is not None:
+        return chosen.evidence(before, y, after), np.full(len(y), np.nan)
     expected = after.expected
     if expected is None:
-        expected = (one.structure or structure).at(before.step).measure(*before.predicted)
+        expected = (chosen.structure or structure).at(before.step).measure(*before.predicted)
     variance = np.diagonal(expected.F, axis1=-2, axis2=-1)
     crps = crps_of_normal(expected.innovation(y), np.sqrt(variance)).sum(axis=-1)
     return log_density(expected, y), crps

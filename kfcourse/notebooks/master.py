@@ -16,7 +16,8 @@ students.  From a master come, for a variant,
 ::
 
     render(...)     the complete notebook, with solutions
-    student(...)   the same without: stubs that raise NotImplementedError, and the pictures to reach
+    student(...)    the same without: stubs that raise NotImplementedError, and the pictures to
+                    reach
     statement(...)  the text of the book's page: questions and stubs, nothing executed
 """
 

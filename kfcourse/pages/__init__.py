@@ -1,7 +1,7 @@
 """What only the pages of the book call.
 
 verification  equations, sentences and numbers that are checked where they are printed; a check that
-fails stops the build
+              fails stops the build
 exponents     squares completed in the exponents of normal laws
 tables        tables of numbers
 figures       the style of the figures, labels at the ends of curves

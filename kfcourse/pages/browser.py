@@ -7,8 +7,8 @@ assignments between the loops.  What comes out is, for each filter of a scalar m
 ::
 
     step(n, v, c, a)      estimates z and predictions of all trajectories, with the coefficients c
-    design(n, v, c, a)
-        the same, and finds the coefficients c, for which it reads the states x and the next ones
+    design(n, v, c, a)    the same, and finds the coefficients c, for which it reads the states x
+                          and the next ones
 
 with the model's parameters in v and an array for each letter in a.  So no formula is written twice,
 and a filter that runs in the browser is the one that the book derives.

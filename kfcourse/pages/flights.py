@@ -53,43 +53,6 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
     return fig
 
 
-def space_and_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
-    """Truth, measurements (steps, runs, 3) and estimates of one run along the whole flight, in
-    space and in plan."""
-    fig = plt.figure(figsize=(WIDTH, 3.9))
-    grid = fig.add_gridspec(1, 2, width_ratios=[1.15, 1])
-    space: Any = fig.add_subplot(grid[0], projection="3d")
-    plan = fig.add_subplot(grid[1])
-    space.set_box_aspect(None, zoom=1.2)
-    for ax, axes in ((space, 3), (plan, 2)):
-        ax.plot(
-            *(y[:, 0, :axes] / 1000).T,
-            ".",
-            color=COLOURS["measurement"],
-            markersize=1.5,
-            label="measurements",
-        )
-        ax.plot(
-            *(track.position[:, :axes] / 1000).T,
-            color=COLOURS["estimate"],
-            linewidth=1.2,
-            label="true path",
-        )
-        for name, positions in estimates.items():
-            ax.plot(*(positions[:, 0, :axes] / 1000).T, linewidth=1.2, label=name, **LOOKS[name])
-    space.set(
-        xlabel="east (km)", ylabel="north (km)", zlim=(0, 10), title="in space, altitude in km"
-    )
-    plan.set(xlabel="east (km)", ylabel="north (km)", title="in plan")
-    plan.set_aspect("equal", adjustable="datalim")
-    for part in range(1, 6):
-        middle = np.median(np.flatnonzero(track.part == part)).astype(int)
-        east, north, _ = track.position[middle] / 1000
-        plan.annotate(str(part), (east, north), xytext=(6, 6), textcoords="offset points")
-    fig.legend(*plan.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
-
-
 def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
     """Truth, measurements (steps, runs, 3) and estimates of one run, in plan, on pieces of parts 1
     to 4."""

@@ -2,15 +2,14 @@
 and what in it is doubtful.
 
 smoothing    `smooth`: the states given all measurements, or some steps ahead; `smooth_iterated`:
-linearised there again;
-             `smoothing_error`: how good they are, where that is known
+             linearised there again; `smoothing_error`: how good they are, where that is known
 evidence     `likelihood`: of each measurement, given all before it
 estimation   `estimate`: parameters and noise variances of the largest likelihood, and what the
-record does not tell; `profile`
+             record does not tell; `profile`
 reading      `read_measurements`: measurements, times and inputs from a CSV file
 examination  `examine`: all that a filter says of a record; `findings`: whether the record bears it
-out; `weights`: how much
-             each measurement counted, behind a gate or where the filter doubts
+             out; `weights`: how much each measurement counted, behind a gate or where the filter
+             doubts
 """
 
 from kfcourse.records.estimation import estimate, profile

@@ -3,10 +3,10 @@ r"""All that a filter says of a record, and whether the record bears it out.
 If the filter is right, its innovations nu_k are normal with the covariance F_k that it expects, and
 independent of each other:
 
-    size   sum of nu^T F^-1 nu
-        chi-squared with as many degrees of freedom as there are numbers measured
-    mean   sum of s / sqrt(N)
-        N(0, 1), for the innovations s of one component over their deviations
+    size         sum of nu^T F^-1 nu       chi-squared with as many degrees of freedom as there are
+                 numbers measured
+    mean         sum of s / sqrt(N)        N(0, 1), for the innovations s of one component over
+                 their deviations
     neighbours   mean of s_j s_{j+1}       N(0, 1/(N - 1)), each s with the next one measured
 
 A gate lets pass what is small: behind it the size is that of a chi-squared number below the gate's

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from tqdm import tqdm
 
 from kfcourse.errors import expect
 from kfcourse.laws import Array
@@ -32,10 +31,8 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 
 LARGEST = 100_000_000  # bytes; a million rows.  /dev/zero never ends
-TIMES = ("time", "t")  # names of the column of times
 INTERVAL = "dt"
 UNEVEN = 0.01  # intervals that differ by more than this part of their median are not of one length
-HOUR = 3600.0  # s: by so much clocks are set back in autumn
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 DATE = re.compile(r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d")
 
@@ -98,40 +95,33 @@ def read_measurements(
         is not used may be that of the times.
     """
     expect(model, Model, "read_measurements")
-    names, cells, lines, comma = _table(str(path), _text(path))
-    named = _columns(str(path), names, model, columns or {})
-    places = {name: names.index(column) for name, column in named.items()}
-    _refuse_units(str(path), [cells[0][i] for i in places.values()], lines[0])
-    table = {
-        name: _numbers(str(path), names[i], [row[i] for row in cells], lines, comma)
-        for name, i in places.items()
-    }
+    table = _table(Path(path))
+    named = _columns(table, model, columns or {})
+    values = {name: table.numbers(column) for name, column in named.items()}
     for name in model.measured:
-        if np.isnan(table[name]).all():
+        if np.isnan(values[name]).all():
             raise RecordError(
                 f"{path}: the column {named[name]} has no number at all; leave it out of the model"
             )
     inputs = {
-        name: _held(str(path), named[name], table[name])
-        for name in model.known.inputs
-        if name in table
+        name: table.held(values[name], named[name]) for name in model.known.inputs if name in values
     }
-    times = _times(str(path), named, table, lines, float(model.known.interval))
+    single = float(model.known.interval)
+    times = _times(table, named, values, single)
     used = {symbol.name for symbol in model.known.symbols}
     if "t" in used - set(model.known.inputs):
         inputs["t"] = times
+    steps = np.diff(times)
     if INTERVAL in model.known.inputs:
-        inputs.setdefault(INTERVAL, intervals(times, float(model.known.interval)))
-    elif "t" not in used and _uneven(times):
-        steps = np.diff(times)
+        inputs.setdefault(INTERVAL, intervals(times, single))
+    elif "t" not in used and len(steps) > 1 and np.ptp(steps) > UNEVEN * np.median(steps):
         warnings.warn(
             f"{path}: the intervals are {steps.min():g} to {steps.max():g}, but the model takes "
-            f"every step alike: write dt into "
-            "its formulas, with inputs = { dt = [1] }",
+            "every step alike: write dt into its formulas, with inputs = { dt = [1] }",
             RecordWarning,
             stacklevel=2,
         )
-    y = np.stack([table[name] for name in model.measured], axis=-1)[:, None]
+    y = np.stack([values[name] for name in model.measured], axis=-1)[:, None]
     warn_of_degrees(f"{path}: a measurement", y, model.measured, model.angles.y)
     return Record(times, y, model.with_inputs(inputs))
 
@@ -143,201 +133,158 @@ def intervals(times: Array, single: float = 1.0) -> Array:
     return np.append(steps, steps[-1] if len(steps) else single)
 
 
-def _text(path: str | Path) -> str:
+class _Table(NamedTuple):
+    """The cells of a file: names of the columns, rows with their lines, and whether decimals may
+    have commas."""
+
+    path: Path
+    names: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    comma: bool
+
+    def error(self, row: int, column: str, problem: str) -> RecordError:
+        return RecordError(f"{self.path}, line {self.lines[row]}, column {column}: {problem}")
+
+    def numbers(self, column: str) -> Array:
+        """The numbers of a column; NaN where a cell is empty."""
+        place, values = self.names.index(column), np.full(len(self.rows), np.nan)
+        for k, row in enumerate(self.rows):
+            text = row[place].strip()
+            if self.comma and text.count(",") == 1 and "." not in text:
+                text = text.replace(",", ".")
+            if text.lower() in ("", "nan"):
+                continue
+            if not NUMBER.fullmatch(text):
+                problem = f"expected a number or nothing, got {shown(row[place])}"
+                raise self.error(k, column, f"{problem}; {_cause(text, first=k == 0)}")
+            values[k] = float(text)
+            if np.isinf(values[k]):
+                raise self.error(k, column, f"{shown(text)} is beyond numbers of double precision")
+        return values
+
+    def held(self, values: Array, column: str) -> Array:
+        """An input with its gaps filled by the value before."""
+        if np.isnan(values[0]):
+            raise self.error(0, column, "an input needs a value from the first row on")
+        return values[np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))]
+
+
+def _text(path: Path) -> str:
     try:
-        with Path(path).open("rb") as file:
+        with path.open("rb") as file:
             content = file.read(LARGEST + 1)
+        text = content.decode("utf-8-sig")
     except FileNotFoundError:
         raise RecordError(f"no file of measurements at {path}; check the path") from None
     except OSError as error:
         raise RecordError(f"{path} cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise RecordError(
+            f"{path}, line {line}: a byte that is not UTF-8 (perhaps UTF-16?); save the file as "
+            "CSV in UTF-8"
+        ) from None
     if len(content) > LARGEST:
         raise RecordError(
             f"{path} has more than {LARGEST:,} bytes: cut it into parts, or keep the columns that "
             f"are needed"
         )
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise RecordError(f"{path} is UTF-16; save it as CSV in UTF-8")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise RecordError(
-            f"{path}, line {line}: a byte that is not UTF-8; save the file as CSV in UTF-8"
-        ) from None
+    return text
 
 
-def _table(name: str, text: str) -> tuple[list[str], list[list[str]], list[int], bool]:
-    """Names of the columns, cells of each row, numbers of the rows' lines, and whether decimals
-    have commas."""
-    lines = re.split("\r\n|\r|\n", text.rstrip())
+def _table(path: Path) -> _Table:
+    """The cells of a file.  Of a single column an empty line is a row, too: a measurement that is
+    missing."""
+    text = _text(path)
     delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
-    names, rows, numbers, before = list[str](), list[list[str]](), list[int](), 0
-    reader = csv.reader(lines, delimiter=delimiter, strict=True)
-    try:
-        for row in tqdm(reader, desc=name, total=len(lines), unit="row", disable=None, delay=2):
-            # rows are lines: a cell must not swallow those below it
-            if reader.line_num > before + 1:
-                raise csv.Error("a cell of several lines")
-            before = reader.line_num
-            if not any(map(str.strip, row)) and len(row) < 2:
-                if len(names) != 1:
-                    continue
-                row = [""]  # of one column an empty line is a row: a measurement that is missing
-            if not names:
-                names = _names(f"{name}, line {before}", row)
-                continue
-            if len(row) != len(names):
-                comma = (
-                    "; where a comma separates decimals, separate cells by semicolons"
-                    if delimiter == ","
-                    else ""
-                )
-                raise RecordError(
-                    f"{name}, line {before}: {len(row)} cells, but the first line names "
-                    f"{len(names)} columns{comma}"
-                )
-            rows.append(row)
-            numbers.append(before)
-    except csv.Error as error:
+    table = _Table(path, [], [], [], delimiter == ";")
+    for number, line in enumerate(re.split("\r\n|\r|\n", text.rstrip()), 1):
+        try:
+            row = next(csv.reader([line], delimiter=delimiter, strict=True), [])
+        except csv.Error as error:
+            raise RecordError(
+                f"{path}, line {number}: {error}; a quoted cell must end in its line"
+            ) from None
+        if not line.strip() and len(row) < 2 and len(table.names) != 1:
+            continue
+        if not table.names:
+            table.names.extend(cell.strip() for cell in row)
+            continue
+        if len(row or [""]) != len(table.names):
+            raise RecordError(
+                f"{path}, line {number}: {len(row)} cells, but the first line names "
+                f"{len(table.names)} columns; delete what stands above the names, separate cells "
+                "by commas, or by semicolons if commas separate decimals"
+            )
+        table.rows.append(row or [""])
+        table.lines.append(number)
+    if not table.rows:
         raise RecordError(
-            f"{name}, line {before + 1}: {error}; a quoted cell must end in its line"
-        ) from None
-    if not names:
-        raise RecordError(f"{name} is empty; its first line names the columns, such as time,y")
-    if not rows:
-        raise RecordError(
-            f"{name} has a line of names and no rows below it: there is nothing to estimate from"
+            f"{path} {'has no rows below its names' if table.names else 'is empty'}; its first "
+            "line names the columns, such as time,y, and each other line is a step"
         )
-    if len(names) == 1 and min(len(line.split()) for line in (names[0], rows[0][0])) > 1:
+    if twice := sorted({name for name in table.names if name and table.names.count(name) > 1}):
         raise RecordError(
-            f"{name} has one column, {shown(names[0])}, as spaces do not separate cells: "
-            "write commas, tabs or semicolons between them"
+            f"{path}: two columns are named {shown(twice[0])}; give each a name of its own"
         )
-    return names, rows, numbers, delimiter == ";"
+    return table
 
 
-def _names(place: str, row: Sequence[str]) -> list[str]:
-    """Names of the columns."""
-    names = [cell.strip() for cell in row]
-    if names[0].startswith(("#", "%", "//")) and len(names[0]) > 2:
-        raise RecordError(
-            f"{place}: {shown(names[0])} is a comment, but the first line must name the columns: "
-            f"delete what stands above "
-            'the names, or before them (numpy.savetxt: comments="")'
-        )
-    if twice := sorted({column for column in names if column and names.count(column) > 1}):
-        raise RecordError(
-            f"{place}: two columns are named {shown(twice[0])}; give each a name of its own"
-        )
-    return names
-
-
-def _columns(
-    path: str, names: Sequence[str], model: Model, given: Mapping[str, str]
-) -> dict[str, str]:
+def _columns(table: _Table, model: Model, given: Mapping[str, str]) -> dict[str, str]:
     """The column of each thing that the model needs, by the model's names."""
     wanted = [*model.measured, *(name for name in model.known.inputs if name != INTERVAL)]
     if unknown := sorted(set(given) - {*wanted, INTERVAL, "time"}):
         known = ", ".join(sorted({*wanted, INTERVAL, "time"}))
         raise RecordError(f"columns are given for {', '.join(unknown)}; the model needs {known}")
     named = {name: given.get(name, name) for name in wanted}
-    clock = given.get("time") or next(
-        (name for name in TIMES if name in names and name not in wanted), None
-    )
+    clocks = [name for name in ("time", "t") if name in table.names and name not in wanted]
     interval, needed = given.get(INTERVAL, INTERVAL), INTERVAL in model.known.inputs
-    if clock is not None:
-        named["time"] = clock
-    elif needed and interval in names:
+    if "time" in given or clocks:
+        named["time"] = given.get("time") or clocks[0]
+    elif needed and interval in table.names:
         named[INTERVAL] = interval
-    elif similar := _similar("time", set(names) - {*named.values()}):
-        remedy = f"say so: columns={{'time': {similar!r}}}, or --column time={similar}"
+    elif needed or _similar("time", table.names) not in (None, *named.values()):
+        problem = _not_there(table, "time", "time")
         if needed or "t" in {symbol.name for symbol in model.known.symbols}:
-            raise RecordError(
-                f"{path} has no column time, which the model needs; if {shown(similar)} is it, "
-                f"{remedy}"
-            )
-        message = f"{path}: the column {shown(similar)} is not used; if it has the times, {remedy}"
-        warnings.warn(message, RecordWarning, stacklevel=3)
-    elif needed:
-        raise RecordError(f"{path} has no column {shown(interval)}{_what_may_be(INTERVAL, names)}")
+            raise RecordError(f"{problem}, and the model needs the times")
+        warnings.warn(f"{problem}; every step is taken alike", RecordWarning, stacklevel=3)
     for name, column in named.items():
-        if column not in names:
-            raise RecordError(f"{path} has no column {shown(column)}{_what_may_be(name, names)}")
+        if column not in table.names:
+            raise RecordError(_not_there(table, name, column))
     return named
 
 
-def _key(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.casefold())
-
-
-def _similar(wanted: str, names: set[str]) -> str | None:
-    """The column that may be the one wanted, in other letters or with a unit."""
-    short = {"t", "ts", "tsec", "date"} if wanted == "time" else set[str]()
-    keys = {name: _key(name) for name in sorted(names)}
+def _similar(wanted: str, names: Sequence[str]) -> str | None:
+    """The column that may be what is wanted, in other letters or with a unit."""
+    keys = {name: re.sub(r"[^a-z0-9]", "", name.casefold()) for name in sorted(names)}
+    short = ("t", "ts", "tsec", "date") if wanted == "time" else ()
     return next(
-        (name for name, key in keys.items() if key in short or key.startswith(_key(wanted))), None
+        (name for name, key in keys.items() if key in short or key.startswith(wanted.lower())), None
     )
 
 
-def _what_may_be(name: str, names: Sequence[str]) -> str:
-    """What a message adds where a column that the model needs is not there."""
-    listed = ", ".join(map(shown, names[:20]))
-    listed += f", ... ({len(names)} in all)" if len(names) > 20 else ""
-    similar = _similar(name, set(names))
-    remedy = (
-        f'rename one, or say which it is, as in columns={{"{name}": "..."}} or --column {name}=...'
+def _not_there(table: _Table, name: str, column: str) -> str:
+    """What a message says where a column is not there."""
+    listed = ", ".join(map(shown, table.names[:20])) + ", ..." * (len(table.names) > 20)
+    similar = _similar(name, table.names)
+    column_of = f"--column {name}={similar or '...'}"
+    return (
+        f"{table.path} has no column {shown(column)}; it has {listed}: "
+        f"{f'if {shown(similar)} is it' if similar else 'if one of them is it'}, say so by "
+        f"columns={{{name!r}: {similar or '...'!r}}}, or {column_of}"
     )
-    if similar:
-        remedy = (
-            f'if {shown(similar)} is it, say so: columns={{"{name}": "{similar}"}}, or '
-            f"--column {name}={similar}"
-        )
-    needed = "; give it a column time" if name == INTERVAL else ""
-    return f", which the model needs{needed}; it has {listed}: {remedy}"
 
 
-def _refuse_units(name: str, cells: Sequence[str], line: int) -> None:
-    """RecordError for a first row of words: units, or more names."""
-    words = [cell.strip() for cell in cells if cell.strip() and cell.strip().lower() != "nan"]
-    if words and not any(re.search(r"\d", word) for word in words) and len(words) == len(cells):
-        raise RecordError(
-            f"{name}, line {line}: {shown(', '.join(words))} and no number; if these are units, "
-            f"delete the "
-            "line: measurements begin below the names"
-        )
-
-
-def _numbers(
-    name: str, column: str, cells: Sequence[str], lines: Sequence[int], comma: bool
-) -> Array:
-    """The numbers of a column; NaN where it is empty."""
-    values = np.full(len(cells), np.nan)
-    for k, cell in enumerate(cells):
-        text = cell.strip()
-        if not text or text.lower() == "nan":
-            continue
-        if comma and text.count(",") == 1 and "." not in text:
-            text = text.replace(",", ".")
-        if not NUMBER.fullmatch(text):
-            fault = f"expected a number or nothing, got {shown(cell)}; {_cause(text)}"
-        elif not np.isfinite(value := float(text)):
-            fault = f"{shown(cell)} is beyond all numbers of double precision"
-        else:
-            values[k] = value
-            continue
-        raise RecordError(f"{name}, line {lines[k]}, column {column}: {fault}")
-    return values
-
-
-def _cause(text: str) -> str:
+def _cause(text: str, first: bool) -> str:
     """Why a cell may be no number, and what to do."""
     if DATE.match(text):
         return (
             "a date or a clock's time: write seconds, such as "
-            "datetime.fromisoformat(...).timestamp() gives, "
-            "of UTC, which has no hour twice"
+            "datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour twice"
         )
+    if first and not re.search(r"\d", text):
+        return "if this is a line of units, delete it: measurements begin below the names"
     if "\u2212" in text:
         return "its sign is a typographic minus (U+2212): write the hyphen, -"
     if "," in text:
@@ -345,53 +292,26 @@ def _cause(text: str) -> str:
     return "leave the cell empty if it is missing"
 
 
-def _held(name: str, column: str, values: Array) -> Array:
-    """An input with its gaps filled by the value before."""
-    if np.isnan(values[0]):
-        raise RecordError(
-            f"{name}, first row, column {column}: an input needs a value from the first row on"
-        )
-    return values[np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))]
-
-
 def _times(
-    name: str,
-    named: Mapping[str, str],
-    table: Mapping[str, Array],
-    lines: Sequence[int],
-    interval: float,
+    table: _Table, named: Mapping[str, str], values: Mapping[str, Array], interval: float
 ) -> Array:
     """Times of the rows, from their column, from that of intervals, or by the model's; RecordError
     if they go back."""
-    if "time" not in table:
-        steps = table.get(INTERVAL, np.full(len(lines), interval))
+    if "time" not in values:
+        steps = values.get(INTERVAL, np.full(len(table.rows), interval))
         if (steps < 0).any():
-            place = f"{name}, line {lines[int(np.argmax(steps < 0))]}, column {named[INTERVAL]}"
-            raise RecordError(f"{place}: an interval must not be negative")
-        return np.concatenate([[0.0], np.cumsum(_held(name, INTERVAL, steps)[:-1])])
-    times, column = table["time"], named["time"]
+            row = int(np.argmax(steps < 0))
+            raise table.error(row, named[INTERVAL], "an interval must not be negative")
+        held = table.held(steps, named.get(INTERVAL, INTERVAL))
+        return np.concatenate([[0.0], np.cumsum(held[:-1])])
+    times, column = values["time"], named["time"]
     if (empty := np.isnan(times)).any():
-        raise RecordError(
-            f"{name}, line {lines[int(np.argmax(empty))]}, column {column}: empty; every row "
-            f"needs its time"
+        raise table.error(int(np.argmax(empty)), column, "empty; every row needs its time")
+    if (back := np.diff(times) < 0).any():
+        k = int(np.argmax(back))
+        problem = (
+            f"{times[k + 1]:.16g} comes after {times[k]:.16g}; sort the rows by time, but where a "
+            "clock was set back write times that only grow, such as UTC"
         )
-    steps = np.diff(times)
-    if not (back := steps < 0).any():
-        return times
-    k = int(np.argmax(back))
-    remedy = "sort the rows by time"
-    if back.sum() == 1 and (times[k + 1 :] <= times[k]).sum() > 1:  # not one row in a wrong place
-        usual = float(np.median(steps))
-        hour = " of daylight saving" if abs(steps[k] + HOUR - usual) <= usual else ""
-        remedy = (
-            f"the clock was set back once, here: an hour{hour} that is there twice, or a second "
-            f"record? Do not sort, "
-            "which would interleave the two: write times that only grow, such as UTC"
-        )
-    place = f"{name}, line {lines[k + 1]}, column {column}"
-    raise RecordError(f"{place}: {times[k + 1]:.16g} comes after {times[k]:.16g}; {remedy}")
-
-
-def _uneven(times: Array) -> bool:
-    steps = np.diff(times)
-    return len(steps) > 1 and bool(np.ptp(steps) > UNEVEN * np.median(steps))
+        raise table.error(k + 1, column, problem)
+    return times

@@ -4,7 +4,7 @@ carrier      a carrier of unknown phase
 flight       the five-part flight of an aircraft
 radar        what a radar measures of it, and the models that track it
 tracking     the Kalman filter of the radar chapters, with a control made of the measurements or
-without
+             without
 errors       errors by part of the flight
 ballistic    a body thrown into the air, and the radar that sees it
 irregular    a track in the plane at unequal intervals, with gaps and gross errors

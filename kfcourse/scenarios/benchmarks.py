@@ -3,20 +3,20 @@
 pendulum()               Särkkä and Svensson (2023), with their data: `pendulum_data()`
 car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
-cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and
-Borisov)
+cubic_sensor()           the conditionally minimax line (Pankov, Bosov and Borisov), with
+                         logistic(), inverse_cube_root()
 lorenz(noise)            the attractor of Lorenz (1963), and measurements of it: `lorenz_data(...)`
 stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its
-course: `bearings_data(...)`
+                         course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a
-radar
+                         radar
 passing_target(angles)   a target whose bearing jumps by a turn
-exact_mul(a, b), double_well(a, b, s)   two of Jimenez's objects in continuous time, with his data:
-`jimenez_data(name)`
+exact_mul(a, b)          with double_well(a, b, s) two of Jimenez's objects in continuous time, with
+                         his data: `jimenez_data(name)`
 benes(interval, r)       the object in continuous time whose filter is known exactly (Benes, 1981)
 local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970 (Cobb, 1978):
-`nile()`
+                         `nile()`
 """
 
 from __future__ import annotations
@@ -37,58 +37,26 @@ from kfcourse.symbolic.model import Model
 DATA = resources.files("kfcourse.scenarios") / "data"
 MODELS = tomllib.loads((DATA / "benchmarks.toml").read_text(encoding="utf-8"))
 
-# Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's
-# notebooks print them.
-PENDULUM_ERRORS = {
-    "EKF": 0.16830859061153763,
-    "UKF": 0.09524392125923083,
-    "Gauss-Hermite 5": 0.0998062421916222,
-    "cubature": 0.1141966031380275,
-    "iterated EKF": 0.16547516472119136,
-    "iterated posterior linearisation": 0.14055766458714145,
-}
-# And of the position of the car over its 100 steps.
-CAR_ERRORS = {"measurements": 0.7679855237247215, "Kalman": 0.4253824660526518}
-
-# Mean square errors on the growth model with a state noise of variance one, 100 runs of 500 steps:
-# those that Hartikainen, Solin and Särkkä (2011) print, and those computed with other programs.
-GROWTH_ERRORS = {"EKF": 125.9, "cubature": 72.3, "Gauss-Hermite 10": 40.9, "particles": 10.2}
-GROWTH_ELSEWHERE = {
-    "EKF": 115.8,
-    "Gauss-Hermite 5": 59.2,
-    "Gauss-Hermite 10": 41.4,
-    "particles": 10.05,
-}
-
-# From the same manual: root mean square errors of the position, means over runs.  Bearings of 1000
-# runs; re-entry, km, of 100.
-BEARINGS_ERRORS = {"EKF": 0.114, "UKF": 0.113}
-REENTRY_ERRORS = {"EKF": 0.0084, "UKF": 0.0084}
-
-# Of the cubic sensor, once it has settled: read from the curves that Pankov, Bosov and Borisov
-# publish.
-CUBIC_SENSOR = {"error variance": 0.356, "state variance": 1.155}
-
-# Of the Lorenz attractor, root mean square errors after a measurement: those that the DAPPER
-# package states for Sakov's settings. The ensemble filter has ten members, the particle filter four
-# thousand.
-LORENZ_ERRORS = {"EKF": 0.92, "ensemble filter": 0.60, "particles": 0.27}
+# What was published; of whom and of what data/benchmarks.toml says.
+_PUBLISHED = MODELS["published"]
+PENDULUM_ERRORS: dict[str, float] = _PUBLISHED["pendulum_errors"]
+PENDULUM_SMOOTHED: dict[str, float] = _PUBLISHED["pendulum_smoothed"]
+PENDULUM_PARTICLES: dict[str, float] = _PUBLISHED["pendulum_particles"]
+CAR_ERRORS: dict[str, float] = _PUBLISHED["car_errors"]
+GROWTH_ERRORS: dict[str, float] = _PUBLISHED["growth_errors"]
+GROWTH_ELSEWHERE: dict[str, float] = _PUBLISHED["growth_elsewhere"]
+BEARINGS_ERRORS: dict[str, float] = _PUBLISHED["bearings_errors"]
+REENTRY_ERRORS: dict[str, float] = _PUBLISHED["reentry_errors"]
+CUBIC_SENSOR: dict[str, float] = _PUBLISHED["cubic_sensor"]
+LORENZ_ERRORS: dict[str, float] = _PUBLISHED["lorenz_errors"]
+EXACT_MUL: list[float] = _PUBLISHED["exact_mul"]
+DOUBLE_WELL: list[float] = _PUBLISHED["double_well"]
 LORENZ_EVERY = 25  # steps between measurements
-
-# Log likelihoods as Jimenez's toolbox SdeEstimation prints them, (1/2) ln 2 pi less than the sum
-# over all innovations but the first, with the estimates to which they belong: of a and b by exact
-# moments, of a, b and s by the normal law's.
-EXACT_MUL = (-0.099611, 0.114830, 17.209)
-DOUBLE_WELL = (-0.9677, 0.083952, 2.2758, -874.0219)
-
-# The pendulum's errors again, of the smoothers.
-PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
-# And of particles, which are random: another program's single run.
-PENDULUM_PARTICLES = {"filter": 0.0799, "smoother": 0.0306}
 
 
 def _model(name: str, **changes: Any) -> Model:
-    return Model.of_table(MODELS[name] | changes)
+    table = MODELS[name] | changes
+    return sampled(**table) if "drift" in table else Model.of_table(table)
 
 
 def _wander(dt: float) -> Array:
@@ -191,12 +159,7 @@ def lorenz_data(runs: int, measured: int, seed: int) -> tuple[Array, Array]:
 
 def stochastic_volatility() -> Model:
     """x' = 0.95 x + 0.25 v,  y = exp(x/2) w: the measurement has mean zero whatever the state."""
-    return Model.define(
-        "a*x + s*v",
-        "exp(x/2)*w",
-        {"a": 0.95, "s": 0.25},
-        prior={"mean": 0, "variance": 0.25**2 / (1 - 0.95**2)},
-    )
+    return _model("stochastic_volatility")
 
 
 def bearings() -> Model:
@@ -240,26 +203,10 @@ def reentry(known: bool) -> Model:
     trajectories are simulated, or for the filters N(0, 1).  As of `pendulum`, the law is that
     before the first prediction.
     """
-    drag = "b0*exp(x5 + (R0 - sqrt(x1**2 + x2**2))/H0)*sqrt(x3**2 + x4**2)"
-    gravity = "mu/(x1**2 + x2**2)**(3/2)"
-    return Model.define(
-        [
-            "x1 + T*x3",
-            "x2 + T*x4",
-            f"x3 + T*({drag}*x3 - {gravity}*x1) + v1",
-            f"x4 + T*({drag}*x4 - {gravity}*x2) + v2",
-            "x5 + v3",
-        ],
-        ["sqrt((x1 - R0)**2 + x2**2) + w1", "atan2(x2, x1 - R0) + w2"],
-        {"T": 0.1, "b0": -0.59783, "H0": 13.406, "mu": 3.986e5, "R0": 6374},
-        angles=["y2"],
-        prior={
-            "mean": [6500.4, 349.14, -1.8093, -6.7967, 0.6932 * known],
-            "variance": [1e-6] * 4 + [0 if known else 1],
-        },
-        state_noise={"variance": [2.4064e-5, 2.4064e-5, 0 if known else 1e-6]},
-        meter_noise={"variance": [1e-6, 0.17e-3**2]},
-    )
+    mean = [6500.4, 349.14, -1.8093, -6.7967, 0.6932 * known]
+    prior = {"mean": mean, "variance": [1e-6] * 4 + [0 if known else 1]}
+    noise = {"variance": [2.4064e-5, 2.4064e-5, 0 if known else 1e-6]}
+    return _model("reentry", prior=prior, state_noise=noise)
 
 
 def passing_target(angles: list[str]) -> Model:
@@ -292,30 +239,15 @@ def exact_mul(a: float, b: float, **options: Any) -> Model:
     """dx = a t x dt + b sqrt(t) x dw, x(0.5) = 1, y = x + w with variance 1e-4 at his instants: its
     moments are known exactly."""
     instants = jimenez_data("exact-mul")[0].tolist()
-    noise, prior = {"variance": 1e-4}, {"mean": 1, "variance": 0}
-    values = {"a": a, "b": b}
-    return sampled(
-        "a*t*x",
-        "b*sqrt(t)*x",
-        "x + w",
-        values,
-        instants=instants,
-        prior=prior,
-        meter_noise=noise,
-        **options,
-    )
+    return _model("exact_mul", parameters={"a": a, "b": b}, instants=instants, **options)
 
 
 def double_well(a: float, b: float, s: float, **options: Any) -> Model:
     """dx = -(a x + b x^3) dt + s dw, x(0) = 0, seen without error every second."""
-    values = {"a": a, "b": b, "s": s}
-    return sampled("-(a*x + b*x**3)", "s", "x + 0*w", values, prior={"variance": 0}, **options)
+    return _model("double_well", parameters={"a": a, "b": b, "s": s}, **options)
 
 
 def benes(interval: float = 0.2, r: float = 0.1, **options: Any) -> Model:
     """dx = tanh(x) dt + dw, x(0) = 0.1, y = x + w with variance r: as Sarkka and Solin (2019) have
     it, but for a known start."""
-    noise, prior = {"variance": r}, {"mean": 0.1, "variance": 0}
-    return sampled(
-        "tanh(x)", "1", "x + w", interval=interval, prior=prior, meter_noise=noise, **options
-    )
+    return _model("benes", interval=interval, meter_noise={"variance": r}, **options)

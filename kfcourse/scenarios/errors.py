@@ -40,12 +40,11 @@ def rms_difference(error: Array, other: Array, part: Array) -> Estimate:
 
 def _by_part(error: Array, part: Array) -> Array:
     """Mean square length by part and run, (parts, runs)."""
-    if error.ndim != 3 or len(error) != len(part):
+    if len(error) != len(part) or error.shape[1] < 2:
         raise ValueError(
-            f"errors must have the shape ({len(part)}, runs, components), got {error.shape}"
+            f"errors must have the shape ({len(part)}, runs, components), two runs at least; got "
+            f"{error.shape}"
         )
-    if error.shape[1] < 2:
-        raise ValueError("a standard error needs at least 2 runs")
     square = (error**2).sum(axis=-1)
     return np.stack([square[part == label].mean(axis=0) for label in np.unique(part)])
 

@@ -104,16 +104,12 @@ def aircraft(
         A number that is not finite or has the wrong sign, a manoeuvre shorter than its two ramps, a
         flight that ends below the ground.
     """
-    _numbers("start", start, 3)
-    _numbers("turns", turns, 2)
-    _numbers("heading and descent", (heading, descent), 2)
-    for name, given, size in (
-        ("speeds", speeds, 2),
-        ("radii", radii, 2),
-        ("durations", durations, 3),
-    ):
-        _numbers(name, given, size)
-        expect_positive(**{name: min(given)})
+    given = {"start": start, "turns": turns, "heading and descent": (heading, descent)}
+    lengths_and_speeds = {"speeds": speeds, "radii": radii, "durations": durations}
+    for name, values in (given | lengths_and_speeds).items():
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} must be finite numbers, got {values!r}")
+    expect_positive(**{name: min(values) for name, values in lengths_and_speeds.items()})
     expect_positive(interval=interval, ramp=ramp)
 
     circles = [
@@ -165,11 +161,6 @@ def aircraft(
     acceleration = np.column_stack([horizontal, -descent / ramp * _step_slope(since)])
     part = 1 + np.searchsorted(ends[:-1], time, side="right")
     return Track(time, position, velocity, acceleration, part)
-
-
-def _numbers(name: str, values: Sequence[float], size: int) -> None:
-    if np.shape(values) != (size,) or not np.isfinite(values).all():
-        raise ValueError(f"{name} must be {size} finite numbers, got {values!r}")
 
 
 def _step(u: Array) -> Array:

@@ -1,9 +1,10 @@
 """A track as it is recorded: fixes of a place in the plane at unequal intervals, some missing, some
 grossly wrong.
 
-x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis, pushed by white acceleration
-of intensity q y_k = `position` + w_k,           w_k ~ N(0, sigma^2);    an outlier has `times` that
-deviation
+    x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis
+    y_k = `position` + w_k,           w_k ~ N(0, sigma^2)
+
+White acceleration of intensity q pushes the track; an outlier has `times` the deviation sigma.
 """
 
 from __future__ import annotations

@@ -102,13 +102,10 @@ def start_up(y: Array, interval: float, R: Array) -> Gaussian:
         Not three complete samples, or R of another shape.
     """
     expect_positive(interval=interval)
-    if y.ndim != 3 or (y.shape[0], y.shape[2]) != (3, 2):
+    if y.shape[::2] != (3, 2) or not np.isfinite(y).all():
         raise ValueError(
-            f"the start-up takes three samples of two coordinates, (3, runs, 2); got {y.shape}"
-        )
-    if not np.isfinite(y).all():
-        raise ValueError(
-            "a sample of the start-up is missing; wait for three complete samples in a row"
+            f"the start-up takes three complete samples of two coordinates, (3, runs, 2); got "
+            f"{y.shape}, missing {int(np.isnan(y).sum())}"
         )
     M = _numeric(START, interval)
     mean = np.einsum("ij,jra->ria", M, y).reshape(y.shape[1], 6)
@@ -123,12 +120,10 @@ def acceleration_from(y: Array, interval: float) -> Array:
     R / interval^4.
     """
     expect_positive(interval=interval)
-    if len(y) < 3:
-        raise ValueError(f"an acceleration takes three samples, got {len(y)}")
     weights = _numeric(START, interval)[2]
-    found = np.full(y.shape, np.nan)
-    found[2:] = weights[0] * y[:-2] + weights[1] * y[1:-1] + weights[2] * y[2:]
-    return found
+    acceleration = np.full(y.shape, np.nan)
+    acceleration[2:] = weights[0] * y[:-2] + weights[1] * y[1:-1] + weights[2] * y[2:]
+    return acceleration
 
 
 def follow(
@@ -164,9 +159,7 @@ def follow(
         runs, 4).
     """
     if len(y) < 4:
-        raise ValueError(
-            f"the filter is ready after three samples and needs more to filter; got {len(y)}"
-        )
+        raise ValueError(f"the filter needs more than three samples, got {len(y)}")
     if not np.isclose(system.A[0, 2], interval, rtol=1e-9, atol=0):
         raise ValueError(
             f"the system was made for an interval of {system.A[0, 2]:g} s, and the samples have "

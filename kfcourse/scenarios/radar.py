@@ -48,20 +48,13 @@ _to_cartesian = compile_function(
 
 def spherical(position: Array) -> Array:
     """Range (m), azimuth and elevation (rad) of positions (..., 3) in m: `SPHERICAL`."""
-    return _to_spherical(_of_three(position))[0]
+    return _to_spherical(np.asarray(position, dtype=float))[0]
 
 
 def cartesian(measured: Array) -> Array:
     """Positions (..., 3) in m of range (m), azimuth and elevation (rad): `CARTESIAN`, the inverse
     of `spherical`."""
-    return _to_cartesian(_of_three(measured))[0]
-
-
-def _of_three(vector: Array) -> Array:
-    vector = np.asarray(vector, dtype=float)
-    if vector.shape[-1:] != (3,):
-        raise ValueError(f"a position has three components, (..., 3); got the shape {vector.shape}")
-    return vector
+    return _to_cartesian(np.asarray(measured, dtype=float))[0]
 
 
 def measure_cartesian(
@@ -112,12 +105,9 @@ def measure_spherical(
 def _noisy(
     true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator
 ) -> Array:
-    try:
-        deviations = np.broadcast_to(np.asarray(sigmas, dtype=float), (3,))
-    except (TypeError, ValueError):
-        raise ValueError(f"sigmas must be one number or three, got {sigmas!r}") from None
-    if not (np.isfinite(deviations).all() and deviations.min() >= 0):
-        raise ValueError(f"standard deviations must be finite and not negative, got {sigmas!r}")
+    deviations = np.asarray(sigmas, dtype=float)
+    if deviations.shape not in ((), (3,)) or not (deviations >= 0).all():
+        raise ValueError(f"sigmas must be one number or three, not negative; got {sigmas!r}")
     expect_sizes(runs=runs)
     noise = np.random.default_rng(seed).standard_normal((len(true), int(runs), 3))
     return true[:, None, :] + deviations * noise

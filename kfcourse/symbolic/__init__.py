@@ -5,7 +5,7 @@ reading      the other things that people write of a model: names, numbers, laws
 angular      which components are angles
 known        what is known of every step: its number, its time, inputs; functions that depend on it
 model        `Model`: object, meter, noises, prior;  jumping: `JumpModel`, several of them and a
-chain
+             chain
 equations    its two equations as functions of arrays
 choices      functions with kinks and jumps
 moments      exact moments of functions of normal variables

@@ -1,5 +1,5 @@
-"""Functions with kinks and jumps, Piecewise and Heaviside: constants where of the step alone, jumps
-where of the state."""
+"""Choices between formulas, Piecewise: indicators where the step decides, jumps where the state
+does."""
 
 from __future__ import annotations
 
@@ -10,40 +10,22 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 
-def masked(
-    equation: sp.MatrixBase, known: tuple[sp.Symbol, ...], variables: list[sp.Symbol]
-) -> tuple[sp.MatrixBase, dict[sp.Dummy, sp.Expr]]:
-    """The equation with a symbol in the place of each function of what is known, such as
-    Heaviside(t - 45): constants."""
-    masks: dict[sp.Dummy, sp.Expr] = {}
-
-    def mask(formula: sp.Expr) -> sp.Expr:
-        if not (known and formula.has(*known)):
-            return formula
-        if isinstance(formula, sp.Function) and not formula.has(*variables):
-            masks[symbol := sp.Dummy(real=True)] = formula
-            return symbol
-        if isinstance(formula, sp.Piecewise) and not decides(formula, variables):
-            return sp.Add(
-                *(mask(branch) * mask(indicator) for branch, indicator in _by_indicators(formula))
-            )
-        return formula.func(*map(mask, formula.args)) if formula.args else formula
-
-    return equation.applyfunc(mask), masks
-
-
-def _by_indicators(choice: sp.Piecewise) -> list[tuple[sp.Expr, sp.Expr]]:
-    """The formulas of a choice, and for each what is 1 where it holds and 0 elsewhere."""
-    conditions = [condition for _, condition in choice.args]
-    return [
-        (
-            branch,
+def by_indicators(formula: sp.Expr, variables: Sequence[sp.Symbol]) -> sp.Expr:
+    """The formula with a sum, of branches times what is 1 where they hold, for each choice that the
+    variables do not decide, such as Piecewise((x, t < 45), (0, True)): a polynomial in x."""
+    if not (formula.has(sp.Piecewise) and formula.has(*variables)):
+        return formula
+    if isinstance(formula, sp.Piecewise) and not decides(formula, variables):
+        conditions = [condition for _, condition in formula.args]
+        indicators = (
             sp.Piecewise(
                 *((sp.Integer(i == j), condition) for j, condition in enumerate(conditions))
-            ),
+            )
+            for i in range(len(conditions))
         )
-        for i, (branch, _) in enumerate(choice.args)
-    ]
+        branches = (by_indicators(branch, variables) for branch, _ in formula.args)
+        return sp.Add(*(a * b for a, b in zip(branches, indicators, strict=True)))
+    return formula.func(*(by_indicators(argument, variables) for argument in formula.args))
 
 
 def decides(formula: sp.Basic, variables: Sequence[sp.Symbol]) -> bool:

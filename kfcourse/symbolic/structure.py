@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial, reduce
+from functools import cached_property, lru_cache, partial
 from itertools import product as cartesian
 from typing import Any, NoReturn
 
@@ -35,7 +35,7 @@ from kfcourse.laws import (
     Vectors,
     measurement_of,
 )
-from kfcourse.symbolic.choices import jumps, masked
+from kfcourse.symbolic.choices import by_indicators, jumps
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -363,11 +363,8 @@ def gaussian(model: Model) -> Structure:
     if model.between is not None:
         return model.between.structure(model, gaussian)
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
-    known = model.known.symbols
-    tau, Theta = _moments(
-        model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known
-    )
-    h, F = _moments(model.meter_equation, model.x, m, d, model.w, *_exact(model.meter_noise), known)
+    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise))
+    h, F = _moments(model.meter_equation, model.x, m, d, model.w, *_exact(model.meter_noise))
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
     return StructuralFormulas(model, "gaussian", z, p, m, d, _all_expanded(functions)).structure()
 
@@ -377,27 +374,20 @@ def _exact(law: Gaussian) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
 
 
 @lru_cache(maxsize=64)  # the same for all values of the parameters
-def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[sp.Symbol, ...]):
+def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov):
     """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
     joint = GaussianMoments(
         [*x, *noise], [*mean, *noise_mean], sp.diag(sp.Matrix(cov), sp.Matrix(noise_cov))
     )
-    size = len(equation)
-    equation, masks = masked(equation, known, [*x, *noise])
-    try:
-        means = sp.Matrix([joint.mean_of(formula) for formula in equation])
-    except NoClosedForm as error:
-        text = reduce(
-            lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error)
-        )
-        raise NoClosedForm(
-            text, error.kind, **{name: part.xreplace(masks) for name, part in error.parts.items()}
-        ) from None
-    covs = sp.zeros(size, size)
-    for i in range(size):
-        for j in range(i, size):
-            covs[i, j] = covs[j, i] = joint.covariance(equation[i], equation[j])
-    return tuple(sp.ImmutableMatrix(matrix.xreplace(masks)) for matrix in (means, covs))
+    parts = [by_indicators(formula, joint.variables) for formula in equation]
+    means = sp.ImmutableMatrix([joint.mean_of(part) for part in parts])
+    covs = {
+        (i, j): joint.covariance(parts[i], parts[j])
+        for i in range(len(parts))
+        for j in range(i, len(parts))
+    }
+    size = len(parts)
+    return means, sp.ImmutableMatrix(size, size, lambda i, j: covs[min(i, j), max(i, j)])
 
 
 def _all_expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:

@@ -1,12 +1,9 @@
 """The map over two parameters: each cell is its own comparison, and says what that says."""
 
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from kfcourse import load_variants
-from kfcourse.lab.maps import draw, parameter_map
-from kfcourse.lab.short_names import title
+from kfcourse.lab.maps import parameter_map
 
 
 @pytest.fixture(scope="module")
@@ -45,27 +42,6 @@ def test_where_the_meter_is_poor_and_the_object_quiet_the_duof_leads(found):
     DUOF 10 %."""
     assert found[0.02, 0.05].leaders(2) == ["duof"]
     assert "duof" not in found[0.05, 0.02].leaders(2)[:1]
-
-
-def test_the_map_is_drawn(found):
-    ax = Figure().add_subplot()
-    assert draw(found, 2, ax) is ax
-    texts = [text.get_text() for text in ax.texts]
-    assert len(texts) == len(ax.patches) == 4
-    for text, result in zip(texts, found.cells.values(), strict=True):
-        best, *others = result.leaders(2)
-        assert text.startswith(title(best) + (f", {len(others)} more\n" if others else "\n"))
-        value, error = (
-            float(number) for number in text.splitlines()[1].removesuffix(" %").split(" ± ")
-        )
-        gap = result.gap(best)[2]
-        assert abs(value - 100 * gap.value) <= 0.05 * error and error == pytest.approx(
-            100 * gap.standard_error, rel=0.05
-        )
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$f$", "$e$")
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["0.02", "0.05"]
-    np.testing.assert_array_equal(ax.get_xlim(), (-0.5, 1.5))
-    ax.figure.canvas.draw()
 
 
 def test_other_than_two_parameters_are_refused():

@@ -174,10 +174,8 @@ def test_the_alarms_are_the_sums_of_the_page():
     )
 
 
-def test_alarms_refuse_records_with_gaps_and_single_steps():
+def test_alarms_refuse_records_with_gaps():
     value = np.zeros((4, 2, 1))
-    with pytest.raises(ValueError, match="at least 2 steps"):
-        alarms(Innovations(value[:1], np.ones((1, 1))))
     value[2, 0] = np.nan
     with pytest.raises(ValueError, match="measurements at every step"):
         alarms(Innovations(value, np.ones((1, 1))))
@@ -196,7 +194,7 @@ def test_a_confidence_ellipse_is_a_level_of_the_chi_squared_law():
 
 def test_a_confidence_ellipse_is_refused_in_words():
     law = Gaussian(np.zeros(2), np.eye(2))
-    with pytest.raises(ValueError, match="between 0 and 1, got 1"):
+    with pytest.raises(ValueError, match=r"between 0 and 1, got a mean .* and 1"):
         confidence_ellipse(law, 1)
-    with pytest.raises(ValueError, match=r"two components of one run, got shapes \(3,\)"):
+    with pytest.raises(ValueError, match=r"two components of one run.* got a mean \(3,\)"):
         confidence_ellipse(Gaussian(np.zeros(3), np.eye(3)))

@@ -339,6 +339,17 @@ def bounded(variant53):
     return by_hand(variant53, squares, own, distance)
 
 
+def test_no_gap_is_stated_better_than_to_a_thousandth_of_the_bound(bounded):
+    """Distances that are small and alike in all batches: the trajectories that carry the gap may be
+    missing in all."""
+    sums = bounded.sums._replace(distance=1e-6 * bounded.sums.distance)
+    gap = replace(bounded, sums=sums).gap("other")
+    assert gap.value.item() == pytest.approx(1e-6 * 1.5 / 4, rel=1e-12)
+    # of 3 degrees of freedom, Student's quantile is 3.18
+    assert gap.half_width().item() == pytest.approx(3.18 * 5e-4, rel=1e-2)
+    assert bounded.gap("other").standard_error.item() > 5e-4, "as scattered as the sample says"
+
+
 def test_all_follows_from_the_bound_and_the_distances_from_it(bounded):
     """Bound 4, distances .5 and 1.5; the exact filter's own squares of the error, 9, are never
     looked at."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from kfcourse.pages.flights import by_part, flight_and_errors, in_plan, space_and_plan
+from kfcourse.pages.flights import by_part, flight_and_errors, in_plan
 from kfcourse.scenarios.errors import rms_by_part
 from kfcourse.scenarios.flight import aircraft
 
@@ -23,21 +23,6 @@ def curves(ax) -> dict:
 def test_errors_over_time(track):
     fig = flight_and_errors(track, {"Kalman": track.position[:, None] + [30.0, 0, 40]}, "Kalman")
     np.testing.assert_allclose(curves(fig.axes[1])["Kalman"].get_ydata(), 50.0)
-    plt.close(fig)
-
-
-def test_the_whole_flight_in_space_and_in_plan(track):
-    y = track.position[:, None] + 5.0
-    fig = space_and_plan(track, y, {"Kalman": y + 1000.0, "extended": y})
-    space, plan = fig.axes
-    for axes, found in ((3, [np.transpose(line.get_data_3d()) for line in space.get_lines()]),
-                        (2, [line.get_xydata() for line in plan.get_lines()])):  # fmt: skip
-        # measurements, truth, filters
-        for drawn, shift in zip(found, (5, 0, 1005, 5), strict=True):
-            np.testing.assert_allclose(drawn, (track.position[:, :axes] + shift) / 1000)
-    for number in plan.texts:  # each stands at its own part
-        on_part = track.position[track.part == int(number.get_text()), :2] / 1000
-        assert np.abs(on_part - number.xy).sum(axis=1).min() < 1e-12
     plt.close(fig)
 
 

@@ -108,7 +108,7 @@ def test_a_column_that_may_be_the_times_is_named(read):
     """A model that takes every step alike needs no times: a warning."""
     with pytest.warns(
         RecordWarning,
-        match="the column 'Time' is not used; if it has the times.*--column time=Time",
+        match="no column 'time'; it has .* if 'Time' is it.*--column time=Time; every step",
     ):
         assert len(read("Time,y\n0,1\n1,1\n", PLAIN).y) == 2
     with pytest.warns(RecordWarning, match="intervals are 1 to 4"):
@@ -135,36 +135,31 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
 "'three'"),
         (GOOD.replace("-3e0", "1e999"), "line 3, column y2: '1e999' is beyond"),
         (GOOD.replace("-3e0", '"1,5"'), "line 3, column y2:.*separate cells by semicolons"),
-        (GOOD.replace("-3e0", "1,5"), "line 3: 5 cells, but the first line names 4 columns; where "
-"a comma"),
+        (GOOD.replace("-3e0", "1,5"), "line 3: 5 cells, but the first line names 4 columns; .* "
+"if commas separate decimals"),
         (GOOD.replace("0.5,,", "0.5,"), "line 3: 3 cells"),
         (GOOD.replace("0.5,", ","), "line 3, column time: empty"),
-        (GOOD.replace("\n2,1", "\n0.25,1"), "line 4, column time: 0.25 comes after 0.5; sort"),
+        (GOOD.replace("\n2,1", "\n0.25,1"), "line 4, column time: 0.25 comes after 0.5; sort .*such "
+"as UTC"),
         (GOOD.replace("0.5,", "2014-03-26,"), "line 3, column time: expected a number"),
         (GOOD.replace(",2\n", ",\n"), "column a: an input needs a value from the first row"),
         (GOOD.replace("1.5", '"1.5'), "line 2.*a quoted cell must end in its line"),
         ("time,y1,y2,a\n0,1,,3\n1,2,,3\n", "column y2 has no number at all"),
         ("dt,y1,y2,a\n1,1,2,3\n-1,1,2,3\n", "line 3, column dt: an interval must not be negative"),
-        (GOOD.encode("utf-16"), "is UTF-16"),
+        (GOOD.encode("utf-16"), r"line 1: a byte that is not UTF-8 \(perhaps UTF-16"),
         (GOOD.replace("-3e0", "é").encode("latin-1"), "line 3: a byte that is not UTF-8"),
         # what people bring
-        (GOOD.replace("time", "Time"), "no column time, which the model needs; if 'Time' is "
-"it.*--column time=Time"),
+        (GOOD.replace("time", "Time"), "no column 'time'; it has .* if 'Time' is it, .*"
+"--column time=Time, and the model needs the times"),
         (GOOD.replace("y2", "Y2 [m]"), r"no column 'y2'.*if 'Y2 \[m\]' is it, say so"),
         (GOOD.replace("0.5,", "2014-03-26T10:00:00Z,"), "line 3, column time: .*a date or a "
 "clock's time: write seconds"),
         (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
-        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2: 'm, m, N, s' and no number; if these are "
-"units, delete the line"),
-        (GOOD.replace(",", " "), "spaces do not separate cells"),
-        ("# recorded by me\n" + GOOD, "line 1: '# recorded by me' is a comment.*delete what "
-"stands above"),
-        ("# " + GOOD.replace("time", "y1").replace("y1,y1", "y1,b"), r"is a "
-r"comment.*numpy\.savetxt"),
-        ("time,y1,y2,a\n" + "".join(f"{t},1,2,3\n" for t in (0, 1800, 3600, 1800, 3600, 5400)),
-         "line 5, column time: 1800 comes after 3600; the clock was set back once.*Do not sort"),
-        ("time,y1,y2,a\n" + "".join(f"{t},1,2,3\n" for t in (0, 1200, 2400, 3600, 1200, 2400)),
-         "an hour of daylight saving that is there twice"),
+        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2, column y1: .* got 'm'; if this is a line of "
+"units, delete it"),
+        (GOOD.replace(",", " "), "no column 'time'; it has 'time y1 y2 a'"),
+        ("# recorded by me\n" + GOOD, "line 2: 4 cells, .*delete what stands above the names"),
+        ("# " + GOOD, "no column 'time'; it has '# time', 'y1'"),
         ("time,y1,y2,a\n1484649904.25,1,2,3\n1484649904.2,1,2,3\n", "1484649904.2 comes after "
 "1484649904.25"),
     ],

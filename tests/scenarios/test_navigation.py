@@ -89,11 +89,11 @@ def test_transition_of_a_double_integrator():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((np.zeros((2, 3)), np.eye(2)), "A must be a square matrix"),
-        ((A, np.eye(3)), "Qc has the shape (3, 3); with 2 states it is (2, 2)"),
+        ((np.zeros((2, 3)), np.eye(2)), "A and Qc must be square matrices (n, n), and B"),
+        ((A, np.eye(3)), "got the shapes (2, 2), (3, 3) and (2, 0)"),
         ((A, np.diag([1.0, -1.0])), "not negative"),
         ((A, [[1.0, 0.5], [0.0, 1.0]]), "symmetric"),
-        ((A, QC, [[1.0]]), "B has the shape (1, 1); with 2 states"),
+        ((A, QC, [[1.0]]), "got the shapes (2, 2), (2, 2) and (1, 1)"),
         ((A * np.nan, QC), "A must be finite"),
         ((A, QC, [[np.inf], [0.0]]), "B must be finite"),
     ],
@@ -325,7 +325,7 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
         ),
         (
             {"observations": [GOOD._replace(tag=np.nan)]},
-            "fast: tag and arrival must be finite, got nan and 1.1",
+            "fast: a measurement has a finite tag and arrival, and a value (runs, 1); got nan, 1.1",
         ),
         (
             {"observations": [GOOD._replace(arrival=0.9)]},
@@ -337,7 +337,7 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
         ),
         (
             {"observations": [GOOD._replace(value=np.zeros((3, 2)))]},
-            "must have the shape (runs, 1), got (3, 2)",
+            "a value (runs, 1); got 1.0, 1.1 and the shape (3, 2)",
         ),
         ({"observations": [GOOD._replace(value=np.full((3, 1), np.inf))]}, "finite, or NaN"),
         (
@@ -357,11 +357,10 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
             {"sensors": [Sensor.define("short", ["s"], "s + w", 1.0)]},
             "short was defined with 1 state component(s)",
         ),
-        ({"depth": -1.0}, "expected a number not below 0, got -1.0"),
         ({"dynamics": DRIVEN}, "have 1 known input(s); give them"),
         (
             {"inputs": inputs_until(3.0, 0.1)},
-            "inputs must have the shape (31, runs or 1, 0), got (31, 1, 1)",
+            "values (s, runs or 1, 0), all finite, got (31,) and (31, 1, 1)",
         ),
         (
             {"dynamics": DRIVEN, "inputs": Inputs(np.array([0.5]), np.zeros((1, 1, 1)))},

@@ -10,12 +10,14 @@
   };
   const ENTIRE = ["exp", "sin", "cos", "sinh", "cosh"];
   const MEANS = ["M", "D", "Cov"];
-  const ROUNDING = 1e-10, CLEAR = 1e-4, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, CERTAIN = 1.35, MOST_TRIED = 4000, SECONDS = 3;
+  const ROUNDING = 1e-10, CLEAR = 1e-4, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, MOST_TRIED = 30000, SECONDS = 3;
   const LONGEST = 600, DEEPEST = 60, MAX_LENGTH = 2000, MAX_EXPONENT = 16, MOST_LINES = 400;
   const COSTS = {
     sign: 1, doubled: 1.05, letter: 1.1, moment: 1.25, power: 1.2, factor: 1.2, "noise-forgotten": 1.22, "noise-mean": 1.45,
-    "lost-factor": 1.3, extra: 1.4, function: 1.4, lost: 1.5, combined: 3,
+    "lost-factor": 1.3, extra: 1.4, function: 1.4, lost: 1.5,
   };
+  const NUMBERS = [-1, 2, 3, 4, 5, 6, 1 / 2, 3 / 2, 5 / 2, 1 / 3, 2 / 3, 4 / 3, 5 / 3, 1 / 4, 3 / 4, 5 / 4, 1 / 5, 2 / 5, 3 / 5, 4 / 5, 6 / 5, 1 / 6, 5 / 6];
+  const POWERS = [1, 2, 3, 4, 0.5, -1, -2], OF_THE_LINE_ABOVE = 1, PROBES = [17 / 60, 71 / 60, -49 / 60];
   const OF_FILTERS = ["y", "K", "R", "lambda", "Psi", "m", "d", "z", "p", "tau", "Theta", "h", "G", "F"];
 
   class Unreadable extends Error {
@@ -547,21 +549,20 @@
   }
 
   function rational(value) {
-    for (let q = 1; q <= 720; q++) {
+    for (let q = 1; q <= 60; q++) {
       const n = Math.round(value * q);
-      if (Math.abs(n / q - value) <= 1e-8 * Math.abs(value)) return [n, q];
+      if (n && Math.abs(n / q - value) <= 1e-8 * Math.abs(value)) return n / q;
     }
     return null;
   }
 
-  const signOf = (root, path) => at(root, path.slice(0, -1)).data[path[path.length - 1]];
-  const every = (values, test) => values.every((one, i) => test(one, i));
-  const same = (a, b) => every(a, (one, i) => Math.abs(one - b[i]) <= CLOSE * (Math.abs(one) + Math.abs(b[i])) + 1e-14);
+  const same = (a, b) => a.every((one, i) => Math.abs(one - b[i]) <= CLOSE * (Math.abs(one) + Math.abs(b[i])) + 1e-14);
 
+  // [cost, slip, tree]: the changes of a line, or of the line above, and the tree with each of them
   class Search {
-    constructor(setting, line, above, mirrored = false) {
-      Object.assign(this, { setting, line, above, mirrored, cost: Infinity });
-      const free = new Set(), waiting = [line, above];
+    constructor(setting, line, above) {
+      Object.assign(this, { setting, line, above });
+      const free = new Set(lawLetters(setting)), waiting = [line, above];
       while (waiting.length) {
         for (const name of letters(waiting.pop())) {
           if (free.has(name)) continue;
@@ -569,20 +570,167 @@
           if (setting.meanings[name]) waiting.push(setting.meanings[name]);
         }
       }
-      for (const name of lawLetters(setting)) free.add(name);
-      this.letters = [...free].filter((name) => !setting.meanings[name]).sort();
-      this.values = new Values(setting, this.letters.length + 10, "slip");
-      this.target = this.values.of(above);
-      this.inverse = pseudoInverse(this.target.map((_, p) => [1, ...this.letters.map((name) => Math.log(Math.abs(this.values.letter(name)[p])))]));
-      this.moments = this.momentPairs();
-      const terms = walk(above).filter(([path]) => path.length && at(above, path.slice(0, -1)).kind === "sum");
-      this.lostTerms = [];
-      for (const [, one] of terms) {
-        for (const term of [one, mean(one)]) {
-          try { this.lostTerms.push([one, term, this.values.of(term)]); } catch (error) { if (!(error instanceof Uncomputed)) throw error; }
+      this.pool = [...free].sort();
+      this.letters = this.pool.filter((name) => !setting.meanings[name]);
+      this.values = new Values(setting, free.size + 10, "slip");
+      [this.mine, this.theirs] = [line, above].map((one) => this.values.of(one));
+      this.inverse = pseudoInverse(this.mine.map((_, p) => [1, ...this.letters.map((name) => Math.log(Math.abs(this.values.letter(name)[p])))]));
+      this.terms = walk(above).filter(([, one]) => one.kind === "sum").flatMap(([, one]) => one.parts.map((part, i) => [one.data[i], part]));
+    }
+
+    best() {
+      const fitting = this.fitting().map(([cost, slip, tree], i) => [cost + this.unlikely(slip), -slip.path.length, i, slip, tree]);
+      fitting.sort((a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2]);
+      const kept = [], place = (slip) => termPath(slip.above ? this.above : this.line, slip.path);
+      for (const [cost, , , slip, tree] of fitting) {
+        if (kept.length && cost > kept[0][0] + 1e-9) break;
+        const here = place(slip);
+        if (kept.some(([, one]) => here.length <= place(one).length && starts(place(one), here))) continue;
+        if (this.equal(tree, slip.above || ofNoise(slip) ? this.line : this.above)) kept.push([cost, slip]);
+      }
+      const slips = kept.map(([, slip]) => slip);
+      if (slips.length && slips[0].kind === "doubled") return slips.slice(-1);
+      return slips.length <= 2 ? slips : [];
+    }
+
+    fitting() {
+      const found = [], moments = this.moments(), end = Date.now() + 1000 * SECONDS, there = letters(this.above);
+      for (const name of this.setting.noises.filter((one) => there.has(one))) {
+        for (const [kind, value] of [["noise-forgotten", 0], ["noise-mean", 1]]) {
+          const tree = replaced(this.above, { [name]: number(value) });
+          if (this.fits(tree, this.mine)) found.push([COSTS[kind], makeSlip(kind, [], name), tree]);
         }
       }
-      this.asAbove = terms.map(([path, one]) => this.values.of(one).map((value) => signOf(above, path) * value));
+      let count = 0;
+      for (const [root, target, ofAbove] of [[this.line, this.theirs, false], [this.above, this.mine, true]]) {
+        for (const [path, node] of walk(root)) {
+          const around = path.map((_, i) => at(root, path.slice(0, i))), wanted = this.wanted(root, path, around, target);
+          const changes = this.ofMoments(path, node, around, moments, ofAbove);
+          if (!ofAbove) changes.push(...this.ofNode(path, node, around, wanted));
+          for (const [cost, slip, other] of changes) {
+            if (++count > MOST_TRIED || Date.now() > end) return found;
+            if (!(wanted ? this.fits(other, wanted) : this.fits(changed(root, path, other), target))) continue;
+            const tree = changed(root, path, other);
+            if (!this.nothing(tree, path, around, slip.kind)) found.push([cost, slip, tree]);
+          }
+        }
+      }
+      return found;
+    }
+
+    // whether a tree has these values: most have not at the first point
+    fits(tree, values) {
+      try { return same([this.values.pairs(tree, 1)[0][0]], [values[0]]) && same(this.values.of(tree), values); } catch (error) {
+        if (error instanceof Uncomputed) return false;
+        throw error;
+      }
+    }
+
+    // whether a change leaves nothing of the mean or the power around it
+    nothing(tree, path, around, kind) {
+      const i = around.findIndex((one) => ["mean", "call", "power"].includes(one.kind));
+      if (i < 0) return false;
+      const outer = at(tree, path.slice(0, i));
+      return this.values.of(kind === "lost-factor" ? outer.parts[0] : outer).every((one) => Math.abs(one) <= 1e-9);
+    }
+
+    // what the value of a node should be; null inside a power, a function or a mean: outside the line is (a + b t)/(c + d t)
+    wanted(root, path, around, target) {
+      if (around.some((one) => !["sum", "product"].includes(one.kind))) return null;
+      const [p, q, r] = PROBES, [first, second, third] = PROBES.map((value) => this.values.of(changed(root, path, number(value))));
+      const wanted = target.map((v, i) => {
+        const ratio = ((((v - first[i]) * (second[i] - third[i])) / (v - third[i]) / (second[i] - first[i])) * (q - p)) / (q - r);
+        return (p - ratio * r) / (1 - ratio);
+      });
+      return wanted.every(Number.isFinite) ? wanted : null;
+    }
+
+    ofMoments(path, node, around, moments, above) {
+      if (around.length && !["sum", "power"].includes(around[around.length - 1].kind)) return [];
+      return moments.map(([wrong, right, order]) => [
+        COSTS.moment + (above ? OF_THE_LINE_ABOVE : 0), makeSlip("moment", path, "", { order, above }),
+        product([node, ...(above ? [wrong, right] : [right, wrong])], [1, 1, -1]),
+      ]);
+    }
+
+    ofNode(path, node, around, wanted) {
+      const found = [], { kind, parts, data } = node, outer = around.length ? around[around.length - 1].kind : "";
+      const beside = around.length && around[around.length - 1].parts.length > 1;
+      const add = (what, other, name = "", below = [], more = 0, lost = null) =>
+        found.push([COSTS[what] + more, makeSlip(what, [...path, ...below], name, { lost }), other]);
+      const without = (i, value) => make(kind, parts.map((part, j) => (i === j ? number(value) : part)), data);
+      if (kind === "sum") {
+        parts.forEach((part, i) => {
+          add("sign", make("sum", parts, data.map((s, j) => (i === j ? -s : s))), "", [i]);
+          if (parts.length < 2) return;
+          const signed = (j) => this.values.of(parts[j]).map((v) => data[j] * v);
+          add(parts.some((_, j) => j !== i && same(signed(j), signed(i))) ? "doubled" : "extra", without(i, 0), "", [i]);
+        });
+      }
+      if (kind === "letter") for (const name of this.pool) if (name !== data) add("letter", letter(name), data);
+      const [base, own] = kind === "power" ? [parts[0], data] : [node, 1], nameOf = (one) => (one.kind === "letter" ? one.data : "");
+      if (base.kind !== "number") for (const k of POWERS) if (k !== own) add("power", power(base, k), nameOf(base));
+      if (kind === "call") for (const name of ENTIRE) add("function", make("call", parts, name), data);
+      if (kind === "product") parts.forEach((part, i) => add("extra", without(i, 1), nameOf(part), [i]));
+      if (outer !== "product") {
+        for (const q of NUMBERS) add(q === -1 ? "sign" : "factor", product([number(q), node]), "", [], kind === "letter" && beside ? 0.35 : 0);
+        for (const name of this.pool) for (const k of [1, 2]) add("lost-factor", product([power(letter(name), k), node]), name);
+      }
+      if (outer !== "sum") {
+        for (const [, one] of this.terms) {
+          for (const term of [one, mean(one)]) for (const sign of [1, -1]) add("lost", total([node, term], [1, sign]), "", [], 0, one);
+        }
+        const monomial = wanted && this.monomial(this.values.of(node).map((v, p) => wanted[p] - v));
+        if (monomial) {
+          const [q, powers] = monomial, names = powers.map(([name]) => name).join(" and ");
+          const more = 0.02 * powers.reduce((s, [, k]) => s + Math.abs(k), 0) + (kind === "sum" ? 0 : 0.1);
+          add("lost", total([node, product([number(q), ...powers.map(([name, k]) => power(letter(name), k))])]), names, [], more);
+        }
+      }
+      return found;
+    }
+
+    // q and powers of letters of which these may be the values
+    monomial(values) {
+      const logs = values.map((one) => Math.log(Math.abs(one)));
+      const powers = this.inverse.slice(1).map((row) => Math.round(row.reduce((s, one, p) => s + one * logs[p], 0)));
+      if (!powers.every((one) => Math.abs(one) <= 12)) return null;
+      const rest = values.map((one, p) => this.letters.reduce((v, name, i) => v / this.values.letter(name)[p] ** powers[i], one));
+      const sorted = rest.sort((a, b) => a - b), n = sorted.length;
+      const q = rational((sorted[Math.floor((n - 1) / 2)] + sorted[Math.ceil((n - 1) / 2)]) / 2);
+      return q && [q, this.letters.map((name, i) => [name, powers[i]]).filter(([, k]) => k)];
+    }
+
+    // wrong and right moments of the normal law, and their order; of functions, too
+    moments() {
+      const found = [], { states, means, cov } = this.setting, atMean = Object.fromEntries(states.map((x, i) => [x, letter(means[i])]));
+      for (const [, call] of [...walk(this.line), ...walk(this.above)]) {
+        if (call.kind !== "call" || !ENTIRE.includes(call.data) || !states.some((x) => letters(call).has(x))) continue;
+        const square = mean(power(call, 2)), there = replaced(call, atMean);
+        found.push([there, mean(call), 0], [power(there, 2), square, 0], [power(mean(call), 2), square, 0]);
+      }
+      states.forEach((x, i) => {
+        const m = letter(means[i]), d = letter(cov[i][i]), moment = mean(power(letter(x), 2));
+        for (let k = 2; k < 9; k++) {
+          const raw = mean(power(letter(x), k)), central = mean(power(minus(letter(x), m), k)), factor = { 4: 3, 6: 15, 8: 105 }[k];
+          found.push([power(m, k), raw, k]);
+          if (k % 2 === 0) found.push([central, raw, k], [raw, central, k]);
+          if (factor) {
+            const square = power(moment, k / 2), own = power(d, k / 2);
+            found.push([square, raw, k], [product([number(factor), square]), raw, k], [own, central, k], [own, raw, k]);
+          }
+          if (k === 4) found.push([raw, minus(raw, power(moment, 2)), k]);
+        }
+      });
+      return found;
+    }
+
+    unlikely(slip) { // changing a term that is nothing, or that stands in the line above as it is
+      if (slip.above || ofNoise(slip) || ["doubled", "extra", "lost"].includes(slip.kind)) return 0;
+      const path = termPath(this.line, slip.path), sign = path.length ? at(this.line, path.slice(0, -1)).data[path[path.length - 1]] : 1;
+      const value = this.values.of(at(this.line, path)).map((one) => sign * one);
+      const stays = path.length && this.terms.some(([own, one]) => same(value, this.values.of(one).map((v) => own * v)));
+      return stays || value.every((one) => Math.abs(one) <= 1e-10) ? 0.35 : 0;
     }
 
     equal(a, b) {
@@ -591,263 +739,10 @@
         throw error;
       }
     }
-
-    valuesOf(node) {
-      try { return this.values.of(node); } catch (error) {
-        if (error instanceof Uncomputed) return this.target.map(() => NaN);
-        throw error;
-      }
-    }
-
-    unlikely(slip) {
-      if (slip.above || ["doubled", "extra", "lost", "noise-forgotten", "noise-mean"].includes(slip.kind)) return 0;
-      const path = termPath(this.line, slip.path), value = this.values.of(at(this.line, path));
-      const stays = path.length && this.asAbove.some((other) => same(value.map((one) => signOf(this.line, path) * one), other));
-      return stays || every(value, (one) => Math.abs(one) <= 1e-10) ? 0.35 : 0;
-    }
-
-    best(found) {
-      const priced = found.map((slip, i) => ({ slip, i, cost: slip.cost + this.unlikely(slip) }));
-      priced.sort((a, b) => a.cost - b.cost || b.slip.path.length - a.slip.path.length || a.i - b.i);
-      const kept = [], places = [];
-      for (const { slip, cost } of priced) {
-        if (kept.length && cost > this.cost + 1e-12 && Math.abs(slip.cost - kept[0].cost) > 1e-12) continue;
-        const place = termPath(slip.above ? this.above : this.line, slip.path);
-        if (places.some(([above, one]) => above === !!slip.above && place.length <= one.length && starts(one, place))) continue;
-        if (!this.equal(slip.repaired, this.above)) continue;
-        places.push([!!slip.above, place]);
-        kept.push(slip);
-        if (kept.length === 1) this.cost = cost;
-      }
-      if (kept.length && kept[0].kind === "doubled") return kept.slice(-1);
-      return kept.length <= 2 ? kept : [];
-    }
-
-    slip(kind, path, repaired, more = {}) {
-      return { kind, path, repaired, name: "", order: 0, lost: null, above: false, ...more, cost: COSTS[kind] + (more.extra || 0) };
-    }
-
-    solved() {
-      const found = [];
-      this.needed(this.line, this.target, [], this.above, (path, node, t, tau) => found.push(...this.told(path, node, t, tau)));
-      return found;
-    }
-
-    needed(node, tau, path, other, seen) {
-      const t = this.values.of(node);
-      if (!every(t, Number.isFinite) || !every(tau, Number.isFinite)) return;
-      seen(path, node, t, tau);
-      const part = node.parts[0], down = (i, values, beside = other) => this.needed(node.parts[i], values, [...path, i], beside, seen);
-      if (node.kind === "sum") {
-        node.parts.forEach((one, i) => { const own = this.values.of(one); down(i, own.map((v, p) => node.data[i] * (tau[p] - t[p]) + v)); });
-      } else if (node.kind === "product") {
-        node.parts.forEach((one, i) => {
-          const own = this.values.of(one);
-          down(i, own.map((v, p) => (node.data[i] > 0 ? (tau[p] * v) / t[p] : (v * t[p]) / tau[p])));
-        });
-      } else if (node.kind === "power" && !(Number.isInteger(node.data) && node.data % 2 === 0)) {
-        down(0, tau.map((v) => Math.sign(v) * Math.abs(v) ** (1 / node.data)));
-      } else if (node.kind === "call" && (node.data === "exp" || node.data === "log")) {
-        down(0, tau.map(node.data === "exp" ? Math.log : Math.exp));
-      } else if (part) {
-        for (const [, one] of walk(other)) {
-          if (one.kind === node.kind && one.data === node.data && same(this.valuesOf(one), tau)) down(0, this.values.of(one.parts[0]), one.parts[0]);
-        }
-      }
-    }
-
-    told(path, node, t, tau) {
-      const found = [], { line } = this, parent = path.length ? at(line, path.slice(0, -1)) : null, last = path[path.length - 1];
-      const inSum = parent && parent.kind === "sum" && parent.parts.length > 1;
-      if (every(tau, (one, p) => Math.abs(one) <= 1e-10 * (Math.abs(this.target[p]) + Math.abs(t[p])))) {
-        if (inSum) {
-          const twice = parent.parts.some((one, i) => i !== last && parent.data[i] === parent.data[last] && same(this.values.of(one), t));
-          found.push(this.slip(twice ? "doubled" : "extra", path, changed(line, path, number(0))));
-        }
-        return found;
-      }
-      for (const [kind, name, factor, extra] of this.ratio(tau.map((v, p) => v / t[p]), node)) {
-        found.push(this.slip(kind, path, changed(line, path, product([factor, node])), { name, extra }));
-      }
-      for (const [wrong, right, order, w, r] of this.moments) {
-        if (same(tau.map((v, p) => v * w[p]), t.map((v, p) => v * r[p]))) {
-          found.push(this.slip("moment", path, changed(line, path, product([node, right, wrong], [1, 1, -1])), { order }));
-        }
-      }
-      const [base, own] = node.kind === "power" ? [node.parts[0], node.data] : [node, 1];
-      if (!["letter", "number", "product"].includes(base.kind)) {
-        for (const exponent of [1, 2, 3, 4, -1, -2, 0.5]) {
-          if (exponent !== own && same(this.values.of(base).map((v) => v ** exponent), tau)) {
-            found.push(this.slip("power", path, changed(line, path, power(base, exponent))));
-          }
-        }
-      }
-      if (!inSum) found.push(...this.lost(path, node, tau.map((v, p) => v - t[p])));
-      if (node.kind === "call") {
-        for (const name of ENTIRE) {
-          const other = make("call", node.parts, name);
-          if (name !== node.data && same(this.values.of(other), tau)) found.push(this.slip("function", path, changed(line, path, other), { name: node.data }));
-        }
-      }
-      return found;
-    }
-
-    monomial(values) {
-      if (!every(values, (one) => Number.isFinite(one) && one !== 0)) return null;
-      const logs = values.map((one) => Math.log(Math.abs(one)));
-      const powers = this.inverse.slice(1).map((row) => Math.round(row.reduce((s, one, p) => s + one * logs[p], 0)));
-      if (powers.some((one) => Math.abs(one) > 12)) return null;
-      const rest = values.map((one, p) => this.letters.reduce((v, name, i) => v / this.values.letter(name)[p] ** powers[i], one));
-      const sorted = rest.slice().sort((a, b) => a - b), n = sorted.length;
-      const q = rational((sorted[Math.floor((n - 1) / 2)] + sorted[Math.ceil((n - 1) / 2)]) / 2);
-      if (!q || !q[0] || !same(rest, rest.map(() => q[0] / q[1]))) return null;
-      return [q, this.letters.map((name, i) => [name, powers[i]]).filter(([, k]) => k)];
-    }
-
-    ratio(ratio, node) {
-      const found = this.monomial(ratio);
-      if (!found) return [];
-      const [[n, q], powers] = found, one = n === q;
-      const factor = product([number(n), number(q), ...powers.map(([name, k]) => power(letter(name), k))], [1, -1, ...powers.map(() => 1)]);
-      const own = letters(node), size = powers.reduce((s, [, k]) => s + Math.abs(k), 0);
-      if (!powers.length) return [[n === -q ? "sign" : "factor", "", factor, Math.max(Math.abs(n), q) <= 60 ? 0 : 1]];
-      if (one && powers.length === 1) {
-        const [[name, k]] = powers, base = node.kind === "power" ? node.parts[0] : node, exponent = node.kind === "power" ? node.data : 1;
-        const gone = base.kind === "letter" && base.data === name && exponent + k === 0;
-        const kind = own.has(name) ? "power" : k > 0 ? "lost-factor" : "combined";
-        return [[kind, name, factor, (Math.abs(k) <= 3 ? 0.02 * (Math.abs(k) - 1) : 1) + (gone ? 0.15 : 0)]];
-      }
-      if (one && powers.length === 2 && powers[0][1] + powers[1][1] === 0 && size <= 8) {
-        const wrong = powers[0][1] < 0 ? powers[0][0] : powers[1][0];
-        return [[own.has(wrong) ? "letter" : "combined", wrong, factor, 0.02 * size]];
-      }
-      if (one && powers.length === 2 && powers.every(([name, k]) => k > 0 && !own.has(name)) && size <= 4) {
-        return [["lost-factor", powers.map(([name]) => name).join(" and "), factor, 0.3]];
-      }
-      return [["combined", "", factor, 0.1 * size]];
-    }
-
-    lost(path, node, rest) {
-      const found = [];
-      for (const [one, term, value] of this.lostTerms) {
-        for (const sign of [1, -1]) {
-          if (same(value.map((v) => sign * v), rest)) {
-            found.push(this.slip("lost", path, changed(this.line, path, total([node, term], [1, sign])), { lost: one, extra: -0.01 }));
-          }
-        }
-      }
-      const monomial = this.monomial(rest);
-      if (monomial && Math.max(Math.abs(monomial[0][0]), monomial[0][1]) <= 60) {
-        const [[n, q], powers] = monomial;
-        const term = product([number(n), number(q), ...powers.map(([name, k]) => power(letter(name), k))], [1, -1, ...powers.map(() => 1)]);
-        const extra = 0.02 * powers.reduce((s, [, k]) => s + Math.abs(k), 0) + (node.kind === "sum" ? 0 : 0.1);
-        found.push(this.slip("lost", path, changed(this.line, path, total([node, term])), { name: powers.map(([name]) => name).join(" and "), extra }));
-      }
-      return found;
-    }
-
-    momentPairs() {
-      const found = [], { states, means, cov } = this.setting, atMean = Object.fromEntries(states.map((x, i) => [x, letter(means[i])]));
-      for (const [, call] of [...walk(this.line), ...walk(this.above)]) {
-        if (call.kind !== "call" || !ENTIRE.includes(call.data) || !states.some((x) => letters(call).has(x))) continue;
-        const square = mean(power(call, 2)), there = replaced(call, atMean);
-        for (const both of [[there, mean(call)], [power(there, 2), square], [power(mean(call), 2), square]]) {
-          const [wrong, right] = this.mirrored ? both.reverse() : both;
-          found.push([wrong, right, 0, this.values.of(wrong), this.values.of(right)]);
-        }
-      }
-      states.forEach((x, i) => {
-        const m = letter(means[i]), moment = [...Array(9).keys()].map((k) => mean(power(letter(x), k)));
-        for (let k = 2; k < 9; k++) {
-          const central = mean(power(minus(letter(x), m), k)), pairs = [[power(m, k), moment[k]]];
-          if (k % 2 === 0) pairs.push([central, moment[k]], [moment[k], central]);
-          if (k === 4 || k === 6 || k === 8) {
-            const square = power(moment[2], k / 2), own = power(letter(cov[i][i]), k / 2);
-            pairs.push([square, moment[k]], [product([number({ 4: 3, 6: 15, 8: 105 }[k]), square]), moment[k]], [own, central], [own, moment[k]]);
-          }
-          if (k === 4) pairs.push([moment[4], minus(moment[4], power(moment[2], 2))]);
-          for (const pair of pairs) {
-            const [wrong, right] = this.mirrored ? [pair[1], pair[0]] : pair;
-            found.push([wrong, right, k, this.values.of(wrong), this.values.of(right)]);
-          }
-        }
-      });
-      return found;
-    }
-
-    noise() {
-      const found = [], mine = this.values.of(this.line), there = letters(this.above);
-      for (const name of this.setting.noises) {
-        if (!there.has(name)) continue;
-        for (const [kind, value] of [["noise-forgotten", 0], ["noise-mean", 1]]) {
-          const other = replaced(this.above, { [name]: number(value) });
-          if (same(this.valuesOf(other), mine) && this.equal(this.line, other)) found.push(this.slip(kind, [], this.above, { name }));
-        }
-      }
-      return found;
-    }
-
-    tried() {
-      const found = [], pool = [...new Set([...this.letters, ...letters(this.line), ...letters(this.above)])].sort();
-      const terms = walk(this.above).filter(([path]) => path.length && at(this.above, path.slice(0, -1)).kind === "sum").map(([, one]) => one);
-      const end = Date.now() + 1000 * SECONDS;
-      let count = 0;
-      for (const [path, node] of walk(this.line)) {
-        const outer = path.map((_, i) => path.slice(0, i)).find((one) => ["mean", "call", "power"].includes(at(this.line, one).kind));
-        if (!outer) continue;
-        for (const [kind, name, other] of changes(node, pool, terms)) {
-          if (++count > MOST_TRIED || Date.now() > end) return found;
-          const line = changed(this.line, path, other);
-          if (!this.first(line)) continue;
-          const around = at(line, outer), nothing = kind === "lost-factor" ? around.parts[0] : around;
-          if (same(this.valuesOf(line), this.target) && !every(this.values.of(nothing), (one) => Math.abs(one) <= 1e-9)) {
-            found.push(this.slip(kind, path, line, { name }));
-          }
-        }
-      }
-      return found;
-    }
-
-    first(line) { // whether it has the right value at the first point: most have not
-      try { return same([this.values.pairs(line, 1)[0][0]], [this.target[0]]); } catch (error) {
-        if (error instanceof Uncomputed) return false;
-        throw error;
-      }
-    }
-
-    misread() {
-      const found = [];
-      for (const slip of new Search(this.setting, this.above, this.line, true).solved()) {
-        const aMean = at(this.above, slip.path).kind === "mean" && ["sign", "factor", "power", "letter"].includes(slip.kind);
-        if ((slip.kind === "moment" || aMean) && this.equal(slip.repaired, this.line)) {
-          found.push(this.slip(slip.kind, slip.path, this.above, { name: slip.name, order: slip.order, above: true }));
-        }
-      }
-      return found;
-    }
   }
 
-  function changes(node, pool, terms) {
-    const found = [], nameOf = (one) => (one.kind === "letter" ? one.data : "");
-    if (node.kind === "sum") {
-      node.parts.forEach((_, i) => {
-        found.push(["sign", "", make("sum", node.parts, node.data.map((s, j) => (i === j ? -s : s)))]);
-        if (node.parts.length > 1) found.push(["extra", "", make("sum", node.parts.filter((__, j) => j !== i), node.data.filter((__, j) => j !== i))]);
-      });
-    }
-    if (node.kind === "letter") for (const name of pool) if (name !== node.data) found.push(["letter", node.data, letter(name)]);
-    if (node.kind === "power") {
-      for (const k of [1, 2, 3, 4, 5, 6]) if (k !== node.data) found.push(["power", nameOf(node.parts[0]), power(node.parts[0], k)]);
-    } else if (node.kind !== "number") for (const k of [2, 3]) found.push(["power", nameOf(node), power(node, k)]);
-    if (node.kind === "call") for (const name of ENTIRE) if (name !== node.data) found.push(["function", node.data, make("call", node.parts, name)]);
-    for (const q of [2, 1 / 2, 3, 1 / 3, 4, 1 / 4, 6, 1 / 6]) found.push(["factor", "", product([number(q), node])]);
-    if (node.kind === "product") {
-      node.parts.forEach((one, i) => found.push(["extra", nameOf(one), make("product", node.parts.map((part, j) => (i === j ? number(1) : part)), node.data)]));
-    }
-    for (const name of pool) found.push(["lost-factor", name, product([letter(name), node])]);
-    for (const one of terms) for (const sign of [1, -1]) found.push(["lost", "", total([node, one], [1, sign])]);
-    return found;
-  }
+  const makeSlip = (kind, path, name = "", more = {}) => ({ kind, path, name, order: 0, lost: null, above: false, ...more });
+  const ofNoise = (slip) => slip.kind.startsWith("noise");
 
   function pseudoInverse(rows) { // (A^T A)^-1 A^T by Gauss and Jordan
     const n = rows[0].length;
@@ -863,17 +758,8 @@
     return system.map((row) => row.slice(n));
   }
 
-  const opened = (setting, node) => (node.kind === "letter" && setting.meanings[node.data] ? setting.meanings[node.data] : node);
-
-  function findSlips(setting, line, above) {
-    const search = new Search(setting, line, opened(setting, above));
-    let found = search.best([...search.solved(), ...search.noise()]);
-    if (!found.length || search.cost > CERTAIN) {
-      const better = search.best(search.tried().filter((one) => !found.length || one.cost < search.cost));
-      found = better.length ? better : found;
-    }
-    return found.length ? found : search.best(search.misread());
-  }
+  const findSlips = (setting, line, above) =>
+    new Search(setting, line, above.kind === "letter" && setting.meanings[above.data] ? setting.meanings[above.data] : above).best();
 
   // ---------------------------------------------------------------- what is said (texts of rules come from the package)
 
@@ -903,7 +789,6 @@
       extra: name ? `something in \`${term}\` does not belong there` : `\`${term}\` does not belong there`,
       function: `in \`${term}\` another function belongs in the place of ${name}`,
       lost: `a term is lost${lost}, in \`${term}\``,
-      combined: `\`${term}\` is not right: more than one of its factors`,
     };
     return [says[slip.kind], term];
   }

@@ -5,9 +5,9 @@ one filter.
 
 Dynamics, Inputs, Path    the motion, and its exact transition over any interval
 Sensor, Clock, observe    what the sensors say of it: a list of `Observation`, in the order of
-arrival
+                          arrival
 fuse                      the filter: each measurement is used at its moment of capture, however
-late it comes
+                          late it comes
 follow                    the same, with its innovations
 
 Chapters "Integration of sensors" and "Rates and time tags" of the book; lecture 12.

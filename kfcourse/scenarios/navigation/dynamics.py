@@ -21,7 +21,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from kfcourse.errors import expect_not_negative, expect_sizes
+from kfcourse.errors import expect_not_negative
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
 
@@ -76,15 +76,12 @@ class Dynamics:
 
     def __post_init__(self) -> None:
         A, Qc = np.asarray(self.A, dtype=float), np.asarray(self.Qc, dtype=float)
-        if A.ndim != 2 or A.shape[0] != A.shape[1]:
-            raise ValueError(f"A must be a square matrix, got the shape {A.shape}")
         n = len(A)
         B = np.zeros((n, 0)) if self.B is None else np.asarray(self.B, dtype=float)
-        if Qc.shape != (n, n):
-            raise ValueError(f"Qc has the shape {Qc.shape}; with {n} states it is {(n, n)}")
-        if B.ndim != 2 or len(B) != n:
+        if A.shape != (n, n) or Qc.shape != (n, n) or B.ndim != 2 or len(B) != n:
             raise ValueError(
-                f"B has the shape {B.shape}; with {n} states it is ({n}, number of inputs)"
+                f"A and Qc must be square matrices (n, n), and B (n, number of inputs); got the "
+                f"shapes {A.shape}, {Qc.shape} and {B.shape}"
             )
         for name, matrix in (("A", A), ("Qc", Qc), ("B", B)):
             if not np.isfinite(matrix).all():
@@ -230,23 +227,17 @@ def predictor(dynamics: Dynamics, inputs: Inputs | None = None) -> Predictor:
 
 
 def _check_inputs(dynamics: Dynamics, times: Array, values: Array) -> None:
-    if (
-        times.ndim != 1
-        or not len(times)
-        or not np.isfinite(times).all()
-        or (np.diff(times) <= 0).any()
-    ):
-        raise ValueError("the times of the inputs must be finite and ascending, one for each value")
-    if values.ndim != 3 or len(values) != len(times) or values.shape[2] != dynamics.inputs:
+    fits = values.ndim == 3 and (len(values), values.shape[2]) == (len(times), dynamics.inputs)
+    if not (fits and np.isfinite(values).all() and _ascending(times)):
         raise ValueError(
-            f"inputs must have the shape ({len(times)}, runs or 1, {dynamics.inputs}), got "
-            f"{values.shape}"
+            f"the inputs need ascending times (s,) and values (s, runs or 1, {dynamics.inputs}), "
+            f"all finite, got {times.shape} and {values.shape}: fill a gap of the fast sensor by "
+            "what it would have said, and enlarge Qc"
         )
-    if not np.isfinite(values).all():
-        raise ValueError(
-            "inputs must be finite: fill a gap of the fast sensor by what it would have said, and "
-            "enlarge Qc"
-        )
+
+
+def _ascending(times: Array) -> bool:
+    return bool(len(times) and np.isfinite(times).all() and (np.diff(times) > 0).all())
 
 
 def sample(
@@ -281,24 +272,13 @@ def sample(
         Times not ascending, a prior or inputs that do not fit.
     """
     times = np.asarray(times, dtype=float)
-    if (
-        times.ndim != 1
-        or not len(times)
-        or not np.isfinite(times).all()
-        or (np.diff(times) <= 0).any()
-    ):
+    if not _ascending(times):
         raise ValueError(
             "times must be a finite ascending vector; np.unique sorts and removes what is twice"
         )
-    expect_sizes(runs=runs)
     rng, n = np.random.default_rng(seed), len(dynamics.A)
     check_prior(prior, runs, n)
     over, move = motion(dynamics, inputs)
-    if inputs is not None and (given := np.shape(inputs.values)[1]) not in (1, runs):
-        raise ValueError(
-            f"the inputs are those of {given} runs, and {runs} are sampled: give one run's, for "
-            f"all, or as many"
-        )
     states = np.empty((len(times), runs, n))
     states[0] = prior.mean + rng.standard_normal((runs, n)) @ square_root(np.asarray(prior.cov)).T
     for k in range(1, len(times)):

@@ -47,7 +47,7 @@ class Past(NamedTuple):
     expected: Measurement | None = None
 
 
-class Told(NamedTuple):
+class Innovation(NamedTuple):
     """What a measurement told beyond the prediction, at its moment of capture.
 
     Attributes
@@ -72,7 +72,7 @@ class Followed(NamedTuple):
     moments."""
 
     law: Gaussian
-    innovations: list[Told]
+    innovations: list[Innovation]
 
 
 def fuse(
@@ -145,23 +145,16 @@ def follow(
     Arguments and errors as of `fuse`.  What arrives after the last of `times` is not used, and told
     nothing.
     """
-    told: list[Told] = []
+    innovations: list[Innovation] = []
 
     def keep(past: Past) -> None:
         if past.event and past.expected:
             innovation, F = past.expected.innovation(past.event.value), past.expected.F
-            told.append(
-                Told(
-                    past.event.sensor.name,
-                    past.event.time,
-                    innovation,
-                    F.reshape(-1, *F.shape[-2:]),
-                )
-            )
+            of = past.event.sensor.name, past.event.time
+            innovations.append(Innovation(*of, innovation, F.reshape(-1, *F.shape[-2:])))
 
-    return Followed(
-        _run(dynamics, sensors, prior, observations, times, inputs, by, None, start, keep), told
-    )
+    laws = _run(dynamics, sensors, prior, observations, times, inputs, by, None, start, keep)
+    return Followed(laws, innovations)
 
 
 def _run(
@@ -188,9 +181,8 @@ def _run(
                 "Sensor.define takes the names of all, in the order of the motion"
             )
     moments = _checked_times(times, start)
-    slack = rounding(
-        moments, *(one.tag for one in observations), *(one.arrival for one in observations), start
-    )
+    stamps = [stamp for message in observations for stamp in (message.tag, message.arrival)]
+    slack = rounding(moments, *stamps, start)
     events = sorted(
         _events(sensors, observations, by, start, slack), key=lambda event: event.arrival
     )
@@ -251,15 +243,11 @@ def _events(
                 f"{', '.join(table) or 'no sensor'}"
             )
         sensor = table[name]
-        if not (np.isfinite(tag) and np.isfinite(arrival)):
+        shape = np.shape(value)
+        if not np.isfinite([tag, arrival]).all() or shape[1:] != (sensor.model.p,):
             raise ValueError(
-                f"{name}: tag and arrival must be finite, got {tag} and {arrival}; drop what "
-                f"cannot be placed in time"
-            )
-        if np.ndim(value) != 2 or np.shape(value)[1] != sensor.model.p:
-            raise ValueError(
-                f"{name}: a measurement must have the shape (runs, {sensor.model.p}), got "
-                f"{np.shape(value)}"
+                f"{name}: a measurement has a finite tag and arrival, and a value (runs, "
+                f"{sensor.model.p}); got {tag}, {arrival} and the shape {shape}"
             )
         if np.isinf(value).any():
             raise ValueError(f"{name}: a measurement must be finite, or NaN where it is missing")
@@ -282,11 +270,6 @@ def _events(
 
 def _checked_depth(events: Sequence[Event], depth: float | None, slack: float) -> float:
     """Seconds that the filter must remember."""
-    if depth is not None and not depth >= 0:
-        raise ValueError(
-            f"depth is how many seconds back the filter remembers: expected a number not below 0, "
-            f"got {depth}"
-        )
     if not events:
         return 0.0
     latest = max(events, key=lambda event: event.arrival - event.time)
@@ -303,12 +286,7 @@ def _checked_depth(events: Sequence[Event], depth: float | None, slack: float) -
 
 def _checked_times(times: Array, start: float) -> list[float]:
     moments = np.asarray(times, dtype=float)
-    if (
-        moments.ndim != 1
-        or not len(moments)
-        or not np.isfinite(moments).all()
-        or (np.diff(moments) < 0).any()
-    ):
+    if not len(moments) or not np.isfinite(moments).all() or (np.diff(moments) < 0).any():
         raise ValueError("times of estimates must be a finite ascending vector")
     if moments[0] < start:
         raise ValueError(
@@ -324,12 +302,8 @@ def _checked_prior(
     """The prior with a mean for each run; the number of runs is that of the measurements, inputs,
     or the prior itself."""
     mean, cov = np.asarray(prior.mean, dtype=float), np.asarray(prior.cov, dtype=float)
-    sizes = {
-        1,
-        *(len(event.value) for event in events),
-        *([] if inputs is None else [np.shape(inputs.values)[1]]),
-    }
-    sizes |= {len(mean)} if mean.ndim == 2 else set()
+    sizes = {len(event.value) for event in events} | ({len(mean)} if mean.ndim == 2 else {1})
+    sizes |= set() if inputs is None else {np.shape(inputs.values)[1]}
     if len(sizes - {1}) > 1:
         raise ValueError(
             f"measurements, inputs and prior are of different numbers of runs: "

@@ -121,11 +121,7 @@ class Sensor:
                 f"sensor has moments of its own; "
                 "write what changes into the state"
             )
-        if not (
-            math.isfinite(self.clock.rate)
-            and math.isfinite(self.clock.shift)
-            and self.clock.rate > 0
-        ):
+        if not (np.isfinite(self.clock).all() and self.clock.rate > 0):
             raise ValueError(
                 f"{self.name}: the clock must have a positive finite rate and a finite shift, got "
                 f"{self.clock}"
@@ -191,10 +187,7 @@ class Sensor:
     def captures(self, duration: float) -> Array:
         """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a
         period, or for no duration."""
-        if not 0 <= duration < math.inf:
-            raise ValueError(
-                f"a duration is a finite number of seconds, not below 0; got {duration}"
-            )
+        expect_not_negative(duration=duration)
         if self.period is None:
             raise ValueError(
                 f"{self.name} has no period, as a recorded sensor: its observations have their "
@@ -275,13 +268,11 @@ def observe(
         arrivals = times + sensor.delays(len(times), rng)
         law = model.meter_noise
         w = law.mean + rng.standard_normal((*x.shape[:2], len(law.mean))) @ square_root(law.cov).T
-        values = on_circle(
-            np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p)), model.angles.y
-        )
-        tags = sensor.clock.reading(times)
+        measured = np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p))
+        values, tags = on_circle(measured, model.angles.y), sensor.clock.reading(times)
         messages += [
-            Observation(sensor.name, float(tag), float(arrival), value)
-            for tag, arrival, value in zip(tags, arrivals, values, strict=True)
+            Observation(sensor.name, *message)
+            for message in zip(tags.tolist(), arrivals.tolist(), values, strict=True)
         ]
     return sorted(messages, key=lambda message: message.arrival)
 
