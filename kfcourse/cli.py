@@ -40,6 +40,7 @@ from kfcourse.lab.short_names import (
     LAB,
     check_names,
     has_exact,
+    judging,
     title,
 )
 from kfcourse.lab.variants import RUNS as CHECKED
@@ -187,6 +188,11 @@ def main() -> None:
     help="Language of the report.",
 )
 @click.option(
+    "--scores",
+    is_flag=True,
+    help="Also judge each filter's prediction of the measurement, doubt and all: log score, CRPS.",
+)
+@click.option(
     "--json",
     "json_file",
     type=click.Path(path_type=Path),
@@ -205,6 +211,7 @@ def lab(
     dask: str | None,
     out: Path | None,
     language: str,
+    scores: bool,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
@@ -250,6 +257,7 @@ def lab(
     result = without_failing(
         filters, model, runs, steps or chosen.steps, seed,
         left_out=refused, same_ensemble=same_ensemble, jobs=jobs, dask=dask,
+        scores=judging(model) if scores else None,
     )  # fmt: skip
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -280,6 +288,13 @@ def _tell(result: Comparison, to_error: bool) -> None:
     for name, gap in result.ranking():
         size = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else size}")
+    if result.scored:
+        lines.append("Predictions of the measurement, mean over the steps ± standard error:")
+        lines.append(f"{'':<18} {'log score':>19} {'CRPS':>19}")
+    for name in result.names if result.scored else ():
+        both = [score(name, steps=slice(None)) for score in (result.log_score, result.crps)]
+        shown = [f"{float(mean.value):10.4f} ± {float(mean.standard_error):.4f}" for mean in both]
+        lines.append(f"{title(name):<18} {shown[0]:>19} {shown[1].replace('nan ± nan', '-'):>19}")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 

@@ -334,6 +334,15 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
         )
 
 
+def judging(model: Model | JumpModel) -> Structure:
+    """The structural functions by which predictions of measurements are judged: the best ones,
+    averaged over modes."""
+    if isinstance(model, JumpModel):
+        return JumpStructures(model).averaged
+    of = Structures(model)
+    return of.linearised if isinstance(of.quadrature, NoClosedForm) else of.normal
+
+
 def exact(model: Model | JumpModel) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not
     enter the bound.
