@@ -86,7 +86,7 @@ SAID = {
     ],
     "a condition": [r"|\gamma|<1"],
     NOTATION: [r"W(\zeta)", "|D|^2", "|C|^2"],
-    "a setting": ["d^2=13"],
+    "a setting": [r"\delta^2=13"],
 }
 EQUALS = {
     r"C_k/\sum s_i^2": r"\hat b_k",
