@@ -45,6 +45,11 @@ def by_tangents(rng):
     )
 
 
+def of_a_sine(rng):
+    m, d = rng.uniform(0.2, 0.9, size=2)
+    return of_package(gaussian(Model.define("x + v", "sin(x) + w")), m, d) | {"m": m, "d": d}
+
+
 over_noise = r"""
 x: num
 V: nodes 0 1
@@ -126,7 +131,7 @@ def variant(rng):
     return values | {"e": e, "f": f, "p": p, "d": p, "m": z}
 
 
-LETTERS = (by_tangents, over_noise, in_short, over_state, moments, variant)
+LETTERS = (by_tangents, of_a_sine, over_noise, in_short, over_state, moments, variant)
 SAID = {
     DEFINITION: [
         "x_{k+1}=cx_k+ex_kv_k",
