@@ -7,7 +7,6 @@ steps       questions about a model with time and inputs: functions that take th
 derived     a question whose answer is a derivation, checked line by line
 engine      is an answer right, or a step on top of a wrong one?  How long may it take?
 diagnosis   what kind of mistake does a wrong answer look like?
-case        one result of a wrong answer: what a hint looks at
 dependence  how a result depends on the arguments
 hints       what can be said of any wrong answer
 failing     one input of a wrong answer, and what it gives there

@@ -10,7 +10,7 @@ import copy
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -41,45 +41,6 @@ class Sensitivity:
     several: bool
     spare: Sequence[str] = ()
 
-    @cached_property
-    def _table(self) -> list[tuple[str, list[bool], list[bool]]]:
-        rows = []
-        for place, name in enumerate(self.names):
-            seen = [
-                row
-                for which in range(min(CALLS, len(self.arguments)))
-                for row in self._changes(place, which)
-            ]
-            if seen:
-                right, mine = (
-                    [any(column) for column in zip(*side, strict=True)]
-                    for side in zip(*seen, strict=True)
-                )
-                rows.append((name, right, mine))
-        return rows
-
-    def _changes(self, place: int, which: int) -> list[tuple[list[bool], list[bool]]]:
-        """Which parts change, of the right answer and of the student's, for each change of an
-        argument that both take."""
-        arguments, found = self.arguments[which], []
-        for other in nudged(arguments[place]):
-            values = [*arguments[:place], other, *arguments[place + 1 :]]
-            try:
-                right, mine = (
-                    [
-                        not same(a, b)
-                        for a, b in zip(self._parts(answer, values), before, strict=True)
-                    ]
-                    for answer, before in zip(self.answers, self.results[which], strict=True)
-                )
-            except (OutOfTime, KeyboardInterrupt):
-                raise
-            # the answer does not work for such an argument, or ends the program
-            except BaseException:
-                continue
-            found.append((right, mine))
-        return found
-
     def _parts(self, answer: Callable, values: Sequence[Any]) -> list[Any]:
         result = answer(*copy.deepcopy(values))
         return list(result) if self.several else [result]
@@ -107,25 +68,31 @@ class Sensitivity:
 
     def unused(self, part: int) -> list[str]:
         """Arguments that the part should depend on and does not."""
-        found = [name for name, right, mine in self._table if right[part] and not mine[part]]
-        return [name for name in found if name not in self.spare and not self._jumps(name, part)]
-
-    def _jumps(self, name: str, part: int) -> bool:
-        """Whether the student's answer changes if an argument is five times as large, or reversed.
-
-        What is counted or rounded does not feel a small change, a median no factor; they depend on
-        the argument all the same.
-        """
-        place = list(self.names).index(name)
-        found = [
-            self.called(place, lambda value: scaled(value, 5.0)),
-            self.called(place, lambda value: changed(value, np.flip)),
+        return [
+            name
+            for place, name in enumerate(self.names)
+            if name not in self.spare and self._moves(place, part) == (True, False)
         ]
-        return any(
-            not same(mine[part], before[part])
-            for called in found
-            for (_, mine), (_, before) in zip(called, self.results, strict=False)
+
+    def _moves(self, place: int, part: int) -> tuple[bool, ...]:
+        """Whether the right part, and the student's, changes with one of the changes of an
+        argument."""
+        return tuple(
+            any(not same(new[side][part], old[side][part]) for new, old in self._changed[place])
+            for side in (0, 1)
         )
+
+    @cached_property
+    def _changed(self) -> list[list[tuple[Sequence[list[Any]], Sequence[list[Any]]]]]:
+        """For each argument what both give with changes of it that both take, and gave without."""
+        return [
+            [
+                pair
+                for change in CHANGES
+                for pair in zip(self.called(place, change), self.results, strict=False)
+            ]
+            for place in range(len(self.names))
+        ]
 
 
 def names_of(answer: Callable, count: int) -> list[str]:
@@ -137,38 +104,23 @@ def names_of(answer: Callable, count: int) -> list[str]:
     return names if len(names) == count else [f"number {place}" for place in range(1, count + 1)]
 
 
-def nudged(value: Any) -> list[Any]:
-    """A hidden argument changed a little, covariances to covariances; nothing if it cannot be
-    changed so."""
-    if isinstance(value, int | np.integer):
-        return (
-            []
-            if isinstance(value, bool)
-            else [value + 1, value + 2, value + 3, 2 * value + 1, 3 * value + 2]
-        )
-    if isinstance(value, float | np.floating):
-        return [value * factor for factor in (1.05, 0.9)]
-    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-        if value.ndim >= 2 and value.shape[-1] == value.shape[-2]:
-            scale = 1.03 + 0.01 * np.arange(value.shape[-1])
-            return [scale[:, None] * value * scale]
-        return [value * np.linspace(1.03, 1.07, value.size).reshape(value.shape)]
-    if inspect.isroutine(value):
+def nudged(value: Any, which: int) -> Any:
+    """A hidden argument changed a little, covariances to covariances.
 
-        def changed(*arguments: Any) -> Any:
-            result = value(*arguments)
-            # a factor alone may cancel: a regression on it is the same; entry by entry the square
-            # of a covariance is one
-            several = isinstance(result, tuple)
-            return (
-                tuple(1.05 * part + 0.01 * part**2 for part in result)
-                if several
-                else 1.05 * result + 0.01 * result**2
-            )
-
-        changed.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
-        return [changed]
-    return []
+    Raises
+    ------
+    IndexError
+        It has not so many changes.
+    """
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        return [value + 1, value + 2, value + 3, 2 * value + 1, 3 * value + 2][which]
+    if callable(value):  # a factor alone may cancel: a regression on it is the same
+        return changed(value, [lambda one: 1.05 * one + 0.01 * one**2][which])
+    factor: Any = [np.linspace(1.03, 1.07, np.size(value)).reshape(np.shape(value)), 0.9][which]
+    if np.ndim(value) >= 2 and value.shape[-1] == value.shape[-2]:
+        scale = 1.03 + 0.01 * np.arange(value.shape[-1])
+        factor = scale[:, None] * scale
+    return changed(value, lambda one: one * factor)
 
 
 def same(first: Any, second: Any) -> bool:
@@ -183,16 +135,13 @@ def scaled(value: Any, factor: float) -> Any:
     return changed(value, lambda one: factor * one)
 
 
-def changed(value: Any, change: Callable[[Any], Any], which: int | None = None) -> Any:
-    """A hidden argument changed: a number, an array, or what a function returns, all of it or one
-    of several results.
+def changed(value: Any, change: Callable[[Any], Any]) -> Any:
+    """A hidden argument changed: a number, an array, or all that a function returns.
 
     Raises
     ------
     TypeError
         It is an integer, or nothing of the kind.
-    IndexError
-        There is no such result.
     """
     if isinstance(value, float | np.floating) or (
         isinstance(value, np.ndarray) and value.dtype.kind == "f"
@@ -203,13 +152,15 @@ def changed(value: Any, change: Callable[[Any], Any], which: int | None = None) 
 
     def other(*arguments: Any) -> Any:
         result = value(*arguments)
-        if which is not None and which >= (len(result) if isinstance(result, tuple) else 1):
-            raise IndexError(which)
-        if not isinstance(result, tuple):
-            return change(result)
-        return tuple(
-            change(part) if which in (None, place) else part for place, part in enumerate(result)
-        )
+        return tuple(map(change, result)) if isinstance(result, tuple) else change(result)
 
     other.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
     return other
+
+
+# What is counted or rounded does not feel a small change, a median no factor.
+CHANGES: Sequence[Callable[[Any], Any]] = (
+    *(partial(nudged, which=which) for which in range(5)),
+    partial(scaled, factor=5.0),
+    partial(changed, change=np.flip),
+)

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.case import Agree, Case
 from kfcourse.checks.dependence import Sensitivity, names_of
 from kfcourse.checks.failing import shown
-from kfcourse.checks.hints import general
+from kfcourse.checks.hints import Agree, Case, general
 from kfcourse.checks.question import Answer, Mistake, Question
 
 MANY = 3  # numbers that are no coincidence
@@ -69,28 +68,23 @@ class Wrong:
             for place in range(len(parts))
             if place not in right
         ]
-        names = list(dict.fromkeys(name for _, seen, _ in found for name in seen))
-        hints: dict[str, list[str]] = {}
-        for part, seen, hint in found:
-            # its formula may be right, on a wrong result
-            if self._known(seen) and not set(seen) & set(found[0][1]):
-                hint += f" Or: it follows from {found[0][0]}."
-            hints.setdefault(hint, []).append(part)
-        first, unknown = found[0], hints.pop("", [])
-        told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
-        # what there are hints of may follow from it
-        start_there = first[0] in unknown and not self._known(names)
-        if unknown and not told:
-            told = [GENERAL]
-        elif start_there:
-            told.insert(
-                0,
-                f"{', '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} wrong too: start "
-                f"there.",
-            )
-        elif unknown:
-            told.append(f"{', '.join(unknown)} may be wrong for the same reason.")
-        return start + " ".join(told), names, _tells(names) and not start_there
+        # a known mistake, or the first hint
+        lead = max(found, key=lambda one: (self._known(one[1]), bool(one[2])))
+        _, names, hint = lead
+        if not hint:
+            return start + GENERAL, names, False
+        same = [part for part, _, other in found if other == hint]
+        rest = [part for part, _, other in found if other != hint]
+        first = found[0][0]
+        explained = _tells(names)
+        says = f"{', '.join(same)}: {hint}"
+        if first not in rest:
+            says += f" {', '.join(rest)} may be wrong for the same reason." if rest else ""
+        elif self._known(names):  # its formula may be right, on a wrong result
+            says += f" Or: it follows from {first}. {first} may be wrong for the same reason."
+        else:  # what there is a hint of may follow from it
+            says, explained = f"{first} is wrong too: start there. {says}", False
+        return start + says, names, explained
 
     def _known(self, names: Sequence[str]) -> bool:
         return any(mistake.name in names for mistake, _ in self.known)
@@ -99,15 +93,10 @@ class Wrong:
         return self.agree(part_of(self.found, place), part_of(wanted, place))
 
     def _swapped(self) -> bool:
-        orders = [
-            order for order in permutations(range(len(self.parts))) if list(order) != sorted(order)
-        ]
         return any(
-            all(
-                self.agree(part_of(self.found, i), part_of(self.expected, j))
-                for i, j in enumerate(order)
-            )
-            for order in orders
+            self.agree([tuple(one[i] for i in order) for one in self.found], self.expected)
+            for order in permutations(range(len(self.parts)))
+            if list(order) != sorted(order)
         )
 
     def _diagnosis(self, place: int | None) -> tuple[list[str], str]:
@@ -137,30 +126,20 @@ class Wrong:
         if seen:
             likely = self._likely(seen)
             return _named(likely), _said(likely)
-        apart = [
-            [not self.agree([a], [b]) for a, b in zip(of(wrong), theirs, strict=True)]
-            for _, wrong in possible
-        ]
-        apart = [row for row in apart if any(row)]
-        telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [
-            True
-        ] * len(theirs)
         others = [
             (name, part_of(self.expected, i)) for i, name in enumerate(self.parts) if i != place
         ]
         said = general(
             Case(
-                *(
-                    mine,
-                    theirs,
-                    self.agree,
-                    self.arguments,
-                    self.names,
-                    place or 0,
-                    others,
-                    telling,
-                ),
-                *(self.sensitivity, self.question.axes),
+                found=mine,
+                expected=theirs,
+                agree=self.agree,
+                arguments=self.arguments,
+                names=self.names,
+                part=place or 0,
+                others=others,
+                sensitivity=self.sensitivity,
+                axes=self.question.axes,
             )
         )
         return ([said[0]], said[1]) if said else ([], "")

@@ -1,14 +1,15 @@
 """Known mistakes as edits of a key's source, and keys on top of other answers.
 
 A key is a plain function.  It may call other functions of the exercises by their names; an edit may
-be in one of these, and another answer may stand in the place of one.
+be in one of these, and another answer may stand in the place of one.  Mistakes that are in no
+catalogue are changes of one node of its syntax.
 """
 
 from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from types import CodeType, FunctionType
 from typing import Any
@@ -120,3 +121,86 @@ def uses(key: Answer) -> set[str]:
 def _names(code: CodeType) -> list[str]:
     inner = [name for part in code.co_consts if isinstance(part, CodeType) for name in _names(part)]
     return [*code.co_names, *inner]
+
+
+OPERATORS: dict[type, tuple[str, type[ast.operator]]] = {
+    ast.Add: ("inner-sign", ast.Sub),
+    ast.Sub: ("inner-sign", ast.Add),
+    ast.Mult: ("quotient", ast.Div),
+    ast.Div: ("quotient", ast.Mult),
+}
+LOST = {
+    ast.Add: "term-lost",
+    ast.Sub: "term-lost",
+    ast.Mult: "factor-lost",
+    ast.Div: "factor-lost",
+    ast.MatMult: "factor-lost",
+    ast.Pow: "power-lost",
+}
+
+
+def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast.expr]]:
+    """Kind of slip, and what would stand in the place of a node; one of these names in that of
+    another."""
+    match node:
+        case ast.Name(id=own) if own in names:
+            yield from (("letter", ast.Name(name)) for name in names if name != own)
+        case ast.BinOp(left=left, op=op, right=right):
+            if type(op) in OPERATORS:
+                kind, opposite = OPERATORS[type(op)]
+                yield kind, ast.BinOp(left, opposite(), right)
+            if isinstance(op, ast.MatMult):
+                yield "order", ast.BinOp(right, op, left)
+            lost = LOST.get(type(op), "")
+            if lost:
+                yield lost, left
+            if lost and isinstance(op, ast.Add | ast.Mult | ast.MatMult):
+                yield lost, right
+            if isinstance(op, ast.Sub):
+                yield lost, ast.UnaryOp(ast.USub(), right)
+            if isinstance(op, ast.Div):
+                yield lost, ast.BinOp(ast.Constant(1), op, right)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            yield "inner-sign", operand
+        case ast.Attribute(value=value, attr="T"):
+            yield "order", value
+        case ast.Call(func=function, args=[first, second], keywords=[]):
+            yield "order", ast.Call(function, [second, first], [])
+        case ast.Call(args=[only], keywords=[]):
+            yield "function-lost", only
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            for other in (value + 1, value - 1, 2 * value):
+                yield "number", ast.Constant(other)
+
+
+def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:
+    """The key with one node of its source changed, in each way: kind of slip, the key.
+
+    What a change might never end stays as it is: `while`, and what a loop goes through.
+    """
+    sources = {name: _source(function) for name, function in pieces(key).items()}
+    for letters in (False, True):  # of which there are many
+        for name, source in sources.items():
+            nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
+            names = sorted({one.arg for one in nodes if isinstance(one, ast.arg)})
+            fixed = [one.iter for one in nodes if isinstance(one, ast.For | ast.comprehension)]
+            left = {id(inner) for one in fixed for inner in ast.walk(one)}
+            for place, node in enumerate(nodes):
+                if isinstance(node, ast.Name) is letters and id(node) not in left:
+                    for number, (kind, _) in enumerate(changes(node, names)):
+                        text = _changed(source, place, number, names)
+                        yield kind, _built(key, {**sources, name: text})
+
+
+def _changed(source: str, place: int, number: int, names: Sequence[str]) -> str:
+    """The source with one of the changes of one node."""
+    tree = ast.parse(source)
+    old = list(ast.walk(tree))[place]
+    _, new = list(changes(old, names))[number]
+    for parent in ast.walk(tree):
+        for field, value in ast.iter_fields(parent):
+            if value is old:
+                setattr(parent, field, new)
+            elif isinstance(value, list):
+                value[:] = [new if one is old else one for one in value]
+    return ast.unparse(ast.fix_missing_locations(tree))

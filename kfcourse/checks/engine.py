@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.case import Agree
 from kfcourse.checks.derived import Derivation
 from kfcourse.checks.diagnosis import GENERAL, Wrong, part_of
 from kfcourse.checks.editing import rebound, uses
-from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
+from kfcourse.checks.equality import Places, Unusable, equal, like, with_values
+from kfcourse.checks.hints import Agree
 from kfcourse.checks.question import (
     MISSING,
     NOT_CHECKED,
@@ -274,9 +274,7 @@ class _Check:
             return self._derived(self.question, found)
         try:
             with time_limit(self.seconds):
-                if self.posed.agree(found, self.posed.expected) and not self._in_numbers(
-                    found, self.posed.expected
-                ):
+                if self.posed.agree(found, self.posed.expected):
                     self.past.given.pop(self.question.name, None)
                     return self._says(PASSED, "right", share=1.0)
         except OutOfTime:
@@ -309,40 +307,24 @@ class _Check:
             message += f" {question.advice}"
         return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
 
-    def _in_numbers(self, found: Any, expected: Any) -> bool:
-        """Whether numbers stand in the place of parameters on which the right formulas depend."""
-        return any(
-            name not in {s.name for s in mine.free_symbols}
-            for mine, right in zip(_flat(found), _flat(expected), strict=True)
-            for name in depends(right, {s.name for s in self.posed.values})
-        )
-
     def _numbers(self, found: list[Any]) -> bool:
-        """Whether the formulas are right where parameters have their values, and those that are
-        wrong as they are lack some."""
-        wrong = [
-            pair
-            for pair in zip(_flat(found), _flat(self.posed.expected), strict=True)
-            if not self.posed.agree(*([one] for one in pair))
-        ]
-        if not all(self._in_numbers(mine, right) for mine, right in wrong):
-            return False
-        sides = (
-            [with_values(one, self.posed.values) for one in _flat(side)]
-            for side in (found, self.posed.expected)
+        """Whether all formulas that are wrong lack parameters, and are right with numbers in their
+        place."""
+        pairs = zip(_flat(found), _flat(self.posed.expected), strict=True)
+        wrong = [pair for pair in pairs if not self.posed.agree(*([one] for one in pair))]
+        names = {s.name for s in self.posed.values}
+        return bool(wrong) and all(
+            names & {s.name for s in right.free_symbols} - {s.name for s in mine.free_symbols}
+            and self.posed.agree(*([with_values(one, self.posed.values)] for one in (mine, right)))
+            for mine, right in wrong
         )
-        return bool(_flat(self.posed.expected)) and self.posed.agree(*sides)
 
     def _wrong(self, found: list[Any]) -> Result:
         pairs = [
             (part_of(found, place), part_of(self.posed.expected, place))
             for place in range(len(self.question.parts))
         ]
-        right = [
-            1
-            for mine, theirs in pairs
-            if self.posed.agree(mine, theirs) and not self._in_numbers(mine, theirs)
-        ]
+        right = [1 for mine, theirs in pairs if self.posed.agree(mine, theirs)]
         share = len(right) / len(self.question.parts) if right else 0.0
         times = self._times(found)
         follows = self._follows(found)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Container, Mapping, Sequence
-from decimal import Decimal, Inexact, localcontext
 from functools import lru_cache
 from typing import Any
 
@@ -21,10 +20,7 @@ from kfcourse.symbolic.formula import symbol
 DIGITS = 60  # of the values of formulas
 # relative difference of equal formulas: half of the digits may be lost by cancellation
 AGREE = sp.Float(10) ** -30
-# of a decimal: as many are not typed but computed; 1/3 and 2*np.pi have some 15 in Python
-FLOAT_DIGITS = 10, 15
-# of numerator and denominator at most: 2**1024 and 10**324 are the ends of double precision
-DOUBLE_BITS = 1100
+TYPED = 11  # characters of a decimal; more are not typed but computed
 # of formulas with such numbers: 15 digits, of which terms that cancel may take three
 FLOATS_AGREE = sp.Float(10) ** -12
 POINTS = 6
@@ -82,17 +78,15 @@ def _formula(answer: Any) -> sp.Expr:
         answer = np.ravel(np.array(answer, dtype=object))[0]
     if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
         raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
-    formula = (
-        sp.nsimplify(answer, rational=True)
-        if isinstance(answer, float | np.floating)
-        else sp.sympify(answer)
-    )
+    formula = sp.sympify(answer)
     if formula.has(sp.Derivative, sp.Integral):
         formula = formula.doit()
     if formula.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
         raise Unusable("the formula is not finite: it contains NaN or infinity")
-    # 0.9 typed for 9/10 is no mistake
-    return formula.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))
+    # 0.9 typed for 9/10 is no mistake; 0.333333333333333 is what Python makes of 1/3
+    return formula.replace(
+        lambda e: e.is_Float and len(str(e).rstrip("0")) < TYPED, lambda e: sp.Rational(str(e))
+    )
 
 
 def _formulas(answer: Any, expected: sp.MatrixBase) -> sp.ImmutableMatrix:
@@ -193,24 +187,21 @@ def equal_formulas(
 ) -> bool:
     """Whether the formulas agree, pairwise, at random points.
 
-    Symbols are told apart by name only.  Where one side has no parameter left as a symbol, the
-    other's get their values. What cannot be evaluated is not equal.
+    Symbols are told apart by name only.  Where the second side has no parameter as a symbol, the
+    first's get their values. What cannot be evaluated is not equal.
     """
     try:
-        sides = [_by_name(formulas) for formulas in (first, second)]
+        sides = [[_renamed(f) for f in formulas] for formulas in (first, second)]
+        floats = any(f.has(sp.Float) for side in sides for f in side)
+        near = FLOATS_AGREE if floats else AGREE
         parameters = {symbol(s.name): value for s, value in values.items()}
-        if parameters and any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
-            numbers = frozenset(parameters.items())
-            sides = [[_with_numbers(f, numbers) for f in side] for side in sides]
+        if parameters and not any(f.free_symbols & set(parameters) for f in sides[1]):
+            sides[0] = [with_values(f, parameters) for f in sides[0]]
         signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
         known, both = frozenset(signs.items()), all(map(_entire, sides[1]))
-        close = [
-            FLOATS_AGREE if _has_floats(a) or _has_floats(b) else AGREE
-            for a, b in zip(*sides, strict=True)
-        ]
         for number in range(max(POINTS, len(places))):
             place = frozenset(places[number % len(places)].items() if places else ())
-            for a, b, near in zip(*sides, close, strict=True):
+            for a, b in zip(*sides, strict=True):
                 left, right = (_value(f, number, known, both, place) for f in (a, b))
                 if not (left.is_number and right.is_number) or not abs(left - right) <= near * (
                     1 + abs(right)
@@ -275,35 +266,5 @@ def _entire(formula: sp.Expr) -> bool:
 
 
 @lru_cache(maxsize=20_000)
-def _has_floats(formula: sp.Expr) -> bool:
-    """Whether a number in it was a float: 0.9 is 9/10, but 0.333333333333333 is what Python makes
-    of 1/3."""
-    least, most = FLOAT_DIGITS
-    with localcontext(prec=most) as context:
-        for one in formula.atoms(sp.Rational):
-            # a power of powers: as a decimal it takes minutes
-            if max(abs(one.p), one.q).bit_length() > DOUBLE_BITS:
-                continue
-            context.clear_flags()
-            decimal = (Decimal(one.p) / Decimal(one.q)).normalize()
-            if not context.flags[Inexact] and len(decimal.as_tuple().digits) >= least:
-                return True
-    return False
-
-
-def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:
-    return [_renamed(f) for f in formulas]
-
-
-@lru_cache(maxsize=20_000)
 def _renamed(formula: sp.Expr) -> sp.Expr:
     return formula.xreplace({s: symbol(s.name) for s in formula.free_symbols})
-
-
-@lru_cache(maxsize=20_000)
-def _with_numbers(formula: sp.Expr, numbers: frozenset[tuple[sp.Symbol, Any]]) -> sp.Expr:
-    return formula.subs(dict(numbers))
-
-
-def _symbols(formulas: Sequence[sp.Expr]) -> set[sp.Symbol]:
-    return set().union(*(f.free_symbols for f in formulas))

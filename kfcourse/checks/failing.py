@@ -50,20 +50,11 @@ def shown(
 def _formula(
     arguments: Sequence[Any], found: Any, part: str, values: Mapping[sp.Symbol, Any]
 ) -> str:
-    given = [
-        s
-        for one in arguments
-        if hasattr(one, "free_symbols")
-        for s in sorted(one.free_symbols, key=str)
-    ]
-    others = sorted(getattr(found, "free_symbols", set()) - set(given), key=str)
     known = {symbol(s.name): value for s, value in values.items()}
+    symbols = {s for one in (*arguments, found) for s in getattr(one, "free_symbols", ())}
     point = {
-        s: sp.Float(DECIMALS[i % len(DECIMALS)], 6) for i, s in enumerate(dict.fromkeys(given))
-    }
-    point |= {
-        s: sp.Float(known.get(symbol(s.name), DECIMALS[-1 - i % len(DECIMALS)]), 6)
-        for i, s in enumerate(others)
+        s: sp.Float(known.get(symbol(s.name), DECIMALS[i % len(DECIMALS)]), 6)
+        for i, s in enumerate(sorted(symbols, key=lambda s: (symbol(s.name) in known, str(s))))
     }
     entries = list(found) if isinstance(found, sp.MatrixBase) else [found]
     numbers = [sp.N(entry.xreplace(point), 8) for entry in entries]
@@ -87,12 +78,8 @@ def _array(
     if axes and found.ndim >= len(axes):
         scale = np.max(np.abs(expected[np.isfinite(expected)]), initial=0.0)
         wrong = ~np.isclose(found, expected, rtol=1e-6, atol=1e-6 * scale, equal_nan=True)
-        place = tuple(
-            int(i)
-            for i in (np.argwhere(wrong) if wrong.any() else np.zeros((1, found.ndim), int))[0][
-                : len(axes)
-            ]
-        )
+        first = np.argwhere(wrong)[0] if wrong.any() else np.zeros(found.ndim, int)
+        place = tuple(int(i) for i in first[: len(axes)])
         found = found[place]
     sizes = expected.shape[: len(place)]
     inputs = []

@@ -9,7 +9,9 @@ looks at one result of an answer, called with all hidden arguments, and at what 
 from __future__ import annotations
 
 import copy
+import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from operator import itemgetter
@@ -18,13 +20,63 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.case import Case, Said
-from kfcourse.checks.dependence import changed, same, scaled
+from kfcourse.checks.dependence import Sensitivity, same, scaled
+from kfcourse.checks.editing import changed_keys
 from kfcourse.checks.equality import depends, equal, like
 from kfcourse.limits import OutOfTime
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision
+SECONDS = 10.0  # for the search among changes of the key
 ROUNDING = 1e-13  # of what cancels, beside what should be there
+
+Agree = Callable[[Sequence[Any], Sequence[Any]], bool]
+Said = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One result of a wrong answer.
+
+    found, expected : for every tuple of hidden arguments
+    arguments, names : these, and what they are called
+    part : its place among the results
+    others : the other results expected, by name
+    axes : what the leading axes of the results are
+    """
+
+    found: Sequence[Any]
+    expected: Sequence[Any]
+    agree: Agree
+    arguments: Sequence[tuple]
+    names: Sequence[str]
+    part: int
+    others: Sequence[tuple[str, Sequence[Any]]]
+    sensitivity: Sensitivity
+    axes: Sequence[str] = ()
+
+    @property
+    def numeric(self) -> bool:
+        return isinstance(self.expected[0], np.ndarray)
+
+    @property
+    def pairs(self) -> list[tuple[Any, Any]]:
+        return list(zip(self.found, self.expected, strict=True))
+
+    @property
+    def flat(self) -> list[np.ndarray]:
+        """All numbers of both sides."""
+        return [
+            np.concatenate([np.ravel(one) for one in side]) for side in (self.found, self.expected)
+        ]
+
+    @property
+    def formulas(self) -> list[tuple[list[sp.Expr], list[sp.Expr]]]:
+        """Entries of both sides."""
+        return [
+            (list(a), list(b)) if isinstance(b, sp.MatrixBase) else ([a], [b])
+            for a, b in self.pairs
+        ]
+
 
 Row = tuple[str, str, Callable[[], Sequence[Any]]]  # name, sentence, what would have been found
 
@@ -59,14 +111,6 @@ OF_RESULT: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
         "It is the square of what it should be, as a variance is of a standard deviation.",
         lambda v: each(v, lambda entry: entry**2),
     ),
-)
-OF_ARGUMENT: tuple[tuple[str, Callable[[Any], Any]], ...] = (
-    ("twice {}", lambda v: 2 * v),
-    ("half of {}", lambda v: v / 2),
-    ("{} with the other sign", lambda v: -v),
-    ("the square of {}", lambda v: v**2),
-    ("the root of {}", lambda v: v**0.5),
-    ("1 less {}", lambda v: 1 - v),
 )
 
 
@@ -124,29 +168,27 @@ def arguments(case: Case) -> Iterator[Row]:
             yield name, says, partial(applied, change, case.expected, values)
 
 
-def replaced(case: Case) -> Iterator[Row]:
-    """What the right answer gives with something else in the place of an argument, or of what an
-    argument returns."""
-    for place, name in enumerate(case.names if case.numeric else ()):
-        for words, change in OF_ARGUMENT:
-            for which in range(3) if callable(case.arguments[0][place]) else (None,):
-                other = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
-                says = (
-                    f"The right answer would give that with {words.format(other)} in the place "
-                    f"of {other}."
-                )
-                yield (
-                    "replaced",
-                    says,
-                    partial(instead, case, {place: partial(altered, place, change, which)}),
-                )
+SLIPS = {
+    "inner-sign": "with one sign changed: a plus for a minus, or the other way",
+    "order": "with something not transposed, or two things in another order",
+    "term-lost": "with one term left out",
+    "factor-lost": "with one multiplication, or division, left out",
+    "quotient": "with a product in the place of a quotient, or the other way",
+    "power-lost": "with a power left out",
+    "function-lost": "with a function, such as a root, left out",
+    "number": "with another number, index or axis somewhere",
+    "letter": "with one letter in the place of another",
+}
 
 
-def altered(
-    place: int, change: Callable[[Any], Any], which: int | None, values: Sequence[Any]
-) -> Any:
-    """One of the arguments, changed."""
-    return changed(values[place], change, which)
+def slips(case: Case) -> Iterator[Row]:
+    """What the right answer gives with one thing changed in its code."""
+    end = time.monotonic() + SECONDS
+    for name, answer in changed_keys(case.sensitivity.answers[0]):
+        if time.monotonic() > end:
+            return
+        says = f"The right answer would give that {SLIPS[name]}."
+        yield name, says, partial(instead, case, {}, answer)
 
 
 def applied(change: Callable[..., Any], *columns: Sequence[Any]) -> list[Any]:
@@ -154,13 +196,14 @@ def applied(change: Callable[..., Any], *columns: Sequence[Any]) -> list[Any]:
     return [change(*row) for row in zip(*columns, strict=True)]
 
 
-def instead(case: Case, other: dict[int, Callable[[Sequence[Any]], Any]]) -> list[Any]:
-    """What the right answer gives with other arguments in some places."""
+def instead(
+    case: Case, other: dict[int, Callable[[Sequence[Any]], Any]], answer: Callable | None = None
+) -> list[Any]:
+    """What the right answer, or another one, gives with other arguments in some places."""
     found = []
+    answer = answer or case.sensitivity.answers[0]
     for values, wanted in zip(copy.deepcopy(case.arguments), case.expected, strict=True):
-        result = case.sensitivity.answers[0](
-            *(other[i](values) if i in other else v for i, v in enumerate(values))
-        )
+        result = answer(*(other[i](values) if i in other else v for i, v in enumerate(values)))
         found.append(like(result[case.part] if case.sensitivity.several else result, wanted))
     return found
 
@@ -230,11 +273,10 @@ def vanishing(case: Case) -> Said | None:
 def rounded(case: Case) -> Said | None:
     """Right, and then rounded; to whole numbers where there are several, as ones and zeros say
     nothing."""
-    if case.numeric:
-        whole = len(np.unique(np.concatenate([np.ravel(a) for a in case.found]))) > 2
-        for decimals in range(0 if whole else 1, 9):
-            if all(np.array_equal(a, np.round(b, decimals)) for a, b in case.pairs):
-                return "precision", "It is rounded: hand in all digits."
+    whole = case.numeric and len(np.unique(case.flat[0])) > 2
+    for decimals in range(0 if whole else 1, 9) if case.numeric else ():
+        if all(np.array_equal(a, np.round(b, decimals)) for a, b in case.pairs):
+            return "precision", "It is rounded: hand in all digits."
     return None
 
 
@@ -242,42 +284,32 @@ def rough(case: Case) -> Said | None:
     """Right to some digits."""
     if not case.numeric or not all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
         return None
-    single = all(
-        np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs
-    )
-    if single and any(
-        not np.array_equal(mine, np.round(mine), equal_nan=True) for mine, _ in case.pairs
-    ):
-        return (
-            "precision",
+    mine, _ = case.flat
+    single = np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True)
+    if single and not np.array_equal(mine, np.round(mine), equal_nan=True):
+        says = (
             "It is right to the 7 digits of single precision (float32): compute in double "
-            "precision (float64).",
+            "precision (float64)."
         )
-    return (
-        "precision",
-        "It is nearly right: is something rounded, or something small left out, added or divided "
-        "otherwise?",
-    )
+    else:
+        says = (
+            "It is nearly right: is something rounded, or something small left out, added or "
+            "divided otherwise?"
+        )
+    return "precision", says
 
 
 def sometimes(case: Case) -> Said | None:
     """Right for some of the hidden arguments."""
     right = [case.agree([a], [b]) for a, b in case.pairs]
-    if not any(good and telling for good, telling in zip(right, case.telling, strict=True)):
+    if not any(right):
         return None
-    sizes = (
-        [int(np.size(b)) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs]
-        if case.numeric
-        else [1] * len(right)
-    )
-    if len(set(sizes)) > 1 and all(
-        (size == 1) == good for size, good in zip(sizes, right, strict=True)
-    ):
+    sizes = [np.size(b) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs if case.numeric]
+    if len(set(sizes)) > 1 and [size == 1 for size in sizes] == right:
         return (
             "scalars-only",
             "It is right for scalars only: look at the order of the matrices, at what is "
-            "transposed, "
-            "and at what is done entry by entry or over all axes at once.",
+            "transposed, and at what is done entry by entry or over all axes at once.",
         )
     return (
         "sometimes",
@@ -318,14 +350,14 @@ def factor_or_term(case: Case) -> Said | None:
     """A factor, or a term, that is the same everywhere, or for all that a call gives."""
     if not case.numeric:
         return None
-    if all(
-        np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max()
-        for a, b in case.pairs
-    ):
-        return "term", "It is right but for a term that is the same everywhere."
-    if all(np.size(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
-        return "term", "It is right but for a term that is one number for all that a call gives."
-    a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    for axis, words in ((0, "the same everywhere"), (None, "one number for all that a call gives")):
+        if all(
+            (np.size(b) if axis is None else np.ndim(b) > 1 and len(b)) > 2
+            and np.max(np.ptp(a - b, axis=axis)) < 1e-9 * np.abs(b).max()
+            for a, b in case.pairs
+        ):
+            return "term", f"It is right but for a term that is {words}."
+    a, b = case.flat
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)
         if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
@@ -468,99 +500,79 @@ def symbols_of(formula: sp.Expr) -> list[str]:
     return depends(formula, {s.name for s in formula.free_symbols})
 
 
-def with_symbol(
-    case: Case, change: Callable[[sp.Symbol], sp.Expr]
-) -> Iterator[tuple[str, list[sp.Expr], list[sp.Expr]]]:
-    """For each symbol of both sides: the student's formulas and the right ones with it changed."""
+def multiplied(case: Case, factor: float) -> Iterator[tuple[str, list[Any], list[Any]]]:
+    """For each argument, or symbol of both sides: the student's results and the right ones with it
+    multiplied."""
+    if case.numeric:
+        for place, name in enumerate(case.names):
+            called = case.sensitivity.called(place, lambda value: scaled(value, factor))
+            right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
+            same_shapes = all(a.shape == b.shape for a, b in zip(mine, right, strict=True))
+            if called and same_shapes and all(np.isfinite(one).all() for one in mine):
+                yield f"`{name}`", mine, right
+        return
     sides = [formulas(case, which) for which in (0, 1)]
-    for name in sorted(
-        set.intersection(*({s.name for f in side for s in f.free_symbols} for side in sides))
-    ):
+    names = [{s.name for f in side for s in f.free_symbols} for side in sides]
+    for name in sorted(names[0] & names[1]):
         mine, right = (
-            [f.xreplace({s: change(s) for s in f.free_symbols if s.name == name}) for f in side]
+            [
+                f.xreplace({s: sp.nsimplify(factor) * s for s in f.free_symbols if s.name == name})
+                for f in side
+            ]
             for side in sides
         )
         if not any(f.has(sp.nan, sp.zoo, sp.oo) for f in (*mine, *right)):
             yield name, mine, right
 
 
-def with_argument(case: Case, factor: float) -> Iterator[tuple[str, list[Any], list[Any]]]:
-    """For each argument: the student's results and the right ones with it multiplied."""
-    for place, name in enumerate(case.names):
-        called = case.sensitivity.called(place, lambda value: scaled(value, factor))
-        right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
-        if called and all(
-            np.isfinite(one).all() and one.shape == two.shape
-            for one, two in zip(mine, right, strict=True)
-        ):
-            yield name, mine, right
-
-
 def limit(case: Case) -> Said | None:
     """Right where something is zero: what comes in with it is wrong."""
-    pairs = with_argument(case, 0.0) if case.numeric else with_symbol(case, lambda _: sp.S.Zero)
     where = [
-        name for name, mine, right in pairs if any(map(np.any, right)) and case.agree(mine, right)
+        name
+        for name, mine, right in multiplied(case, 0.0)
+        if any(map(np.any, right)) and case.agree(mine, right)
     ]
     if where and case.numeric:  # where nothing is brought in near zero either, that tells nothing
-        near = {name for name, mine, right in with_argument(case, 0.01) if case.agree(mine, right)}
+        near = {name for name, mine, right in multiplied(case, 0.01) if case.agree(mine, right)}
         where = [name for name in where if name not in near]
     if not where:
         return None
-    which = " or ".join((f"`{name}`" if case.numeric else name) for name in where[:3])
     part = f"look at the part that {'this' if len(where) == 1 else 'each of these'} brings in"
-    return "limit", f"It is right where {which} is zero: {part}."
-
-
-POWERS = [sp.Rational(k, 2) for k in range(-8, 9)]
+    return "limit", f"It is right where {' or '.join(where[:3])} is zero: {part}."
 
 
 def power(case: Case) -> Said | None:
     """Another power of an argument than in the right answer."""
-    if case.numeric:
-        before = case.found, case.expected
-        grown: dict[str, list[list[float]]] = {}
-        for factor in (2.0, 4.0):
-            for name, *after in with_argument(case, factor):
-                grown.setdefault(name, []).append(
-                    [ratio(new, old) for new, old in zip(after, before, strict=True)]
-                )
-        for name, growth in grown.items():
-            if len(growth) == 2 and np.isfinite(growth).all():
-                (mine, right), again = growth
-                # powers, both of them
-                if abs(right - mine) > 1e-6 and np.allclose(again, [mine**2, right**2], rtol=1e-6):
-                    return (
-                        "power",
-                        f"It grows with another power of `{name}` than it should: check the units.",
-                    )
-        return None
-    for name, *sides in with_symbol(case, lambda s: 2 * s):
-        powers = [
-            [k for k in POWERS if case.agree(new, [2**k * f for f in formulas(case, side)])]
-            for side, new in enumerate(sides)
-        ]
-        if all(len(k) == 1 for k in powers) and powers[0] != powers[1]:
-            return (
-                "power",
-                f"It grows with another power of {name} than it should: check the units.",
-            )
+    before = [case.found, case.expected] if case.numeric else [formulas(case, i) for i in (0, 1)]
+    grown: dict[str, list[list[float]]] = {}
+    for factor in (2, 4):  # powers, if both give the same
+        for name, *after in multiplied(case, factor):
+            pairs = zip(after, before, strict=True)
+            grown.setdefault(name, []).append([exponent(case, factor, *pair) for pair in pairs])
+    for name, ((mine, right), *again) in grown.items():
+        if again and abs(mine - right) > 1e-6 and np.allclose(again, [[mine, right]], atol=1e-6):
+            says = f"It grows with another power of {name} than it should: check the units."
+            return "power", says
     return None
 
 
-def ratio(new: Sequence[Any], old: Sequence[Any]) -> float:
-    """By how much everything has grown; NaN if it has not grown alike."""
+def exponent(case: Case, factor: int, new: Sequence[Any], old: Sequence[Any]) -> float:
+    """The power of the factor by which everything has grown; NaN if it has not grown alike."""
+    if not case.numeric:
+        fitting = [k for k in POWERS if case.agree(new, [factor**k * f for f in old])]
+        return float(fitting[0]) if len(fitting) == 1 else np.nan
     pairs = list(zip(new, old, strict=False))
     if any(np.shape(a) != np.shape(b) for a, b in pairs):
         return np.nan
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in pairs]) for which in (0, 1))
     clear = np.abs(b) > 1e-9 * np.max(np.abs(b), initial=0.0)
     ratios = a[clear] / b[clear]
-    return (
-        float(ratios[0])
-        if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max()
-        else np.nan
-    )
+    if not len(ratios) or np.ptp(ratios) > 1e-7 * np.abs(ratios).max():
+        return np.nan
+    return float(np.log(ratios[0]) / np.log(factor))
+
+
+POWERS = [sp.Rational(k, 2) for k in range(-8, 9)]
 
 
 def narrow(case: Case) -> Said | None:
@@ -604,23 +616,17 @@ def direction(case: Case) -> Said | None:
     """Too large, or too small, wherever it is wrong."""
     if not case.numeric:
         return None
-    a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    a, b = case.flat
     wrong = np.isfinite(b) & ~np.isclose(a, b, rtol=1e-9, atol=0)
     larger = np.abs(a[wrong]) > np.abs(b[wrong])
     # below zero is not too large, whatever its size
     signs = a[wrong] * b[wrong] < 0, (a[wrong] < 0) & (b[wrong] == 0)
     if np.sum(wrong) < 3 or np.any(signs) or larger.any() != larger.all():
         return None
-    if larger.all():
-        return (
-            "too-large",
-            "It is too large wherever it is wrong: is something added that does not belong there, "
-            "or not divided?",
-        )
-    return (
-        "too-small",
-        "It is too small wherever it is wrong: is something missing, or divided once too often?",
-    )
+    words = ("large", "is something added that does not belong there, or not divided?")
+    if not larger.all():
+        words = ("small", "is something missing, or divided once too often?")
+    return f"too-{words[0]}", f"It is too {words[0]} wherever it is wrong: {words[1]}"
 
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
@@ -628,18 +634,18 @@ HINTS: tuple[Callable[[Case], Said | None], ...] = (
     compared(results),
     rounded,
     rough,
-    sometimes,
     unused,
     improper,
     first_step,
     factor_or_term,
     entries,
     compared(arguments),
+    sometimes,
     limit,
     power,
     narrow,
     terms,
-    compared(replaced),
+    compared(slips),
     direction,
 )
 

@@ -21,6 +21,21 @@ def _cores() -> int:
     return int(cpu_count())
 
 
+FILE = click.Path(path_type=Path)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+MASTERS = click.option(
+    "--masters", type=FILE, help="Folder of other masters, <set>/statement.md each."
+)
+JOBS = click.option(
+    "--jobs",
+    "workers",
+    type=click.IntRange(min=1),
+    default=_cores,
+    show_default="all cores",
+    help="Notebooks at once.",
+)
+
+
 def _options(command: Callable) -> Callable:
     """Options common to exercises and solutions."""
     options = [
@@ -32,35 +47,14 @@ def _options(command: Callable) -> Callable:
             "--sets", "letters", help="Letters of the sets, separated by commas.  [default: all]"
         ),
         click.option(
-            "--variants",
-            "variants_file",
-            type=click.Path(path_type=Path),
-            help="Another TOML file of variants.",
+            "--variants", "variants_file", type=FILE, help="Another TOML file of variants."
         ),
         click.option(
-            "--students",
-            type=click.Path(path_type=Path),
-            help="CSV with name, group: a variant for each student.",
+            "--students", type=FILE, help="CSV with name, group: a variant for each student."
         ),
-        click.option(
-            "--out",
-            required=True,
-            type=click.Path(path_type=Path, file_okay=False),
-            help="Folder of the notebooks.",
-        ),
-        click.option(
-            "--masters",
-            type=click.Path(path_type=Path),
-            help="Folder of other masters, <set>/statement.md each.",
-        ),
-        click.option(
-            "--jobs",
-            "workers",
-            type=click.IntRange(min=1),
-            default=_cores,
-            show_default="all cores",
-            help="Notebooks at once.",
-        ),
+        click.option("--out", required=True, type=FOLDER, help="Folder of the notebooks."),
+        MASTERS,
+        JOBS,
     ]
     return functools.reduce(lambda decorated, option: option(decorated), reversed(options), command)
 
@@ -111,24 +105,10 @@ def _make(kind: str, **options: Any) -> None:
     help="File of the table.  [default: FOLDER-grades.csv]",
 )
 @click.option(
-    "--variants",
-    "variants_file",
-    type=click.Path(path_type=Path),
-    help="The file of variants that you handed out.",
+    "--variants", "variants_file", type=FILE, help="The file of variants that you handed out."
 )
-@click.option(
-    "--masters",
-    type=click.Path(path_type=Path),
-    help="Folder of other masters, <set>/statement.md each.",
-)
-@click.option(
-    "--jobs",
-    "workers",
-    type=click.IntRange(min=1),
-    default=_cores,
-    show_default="all cores",
-    help="Notebooks at once.",
-)
+@MASTERS
+@JOBS
 @click.option(
     "--seconds",
     type=click.FloatRange(min=1),
@@ -151,13 +131,13 @@ def _make(kind: str, **options: Any) -> None:
 )
 @click.option(
     "--students",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="The assignment that `exercises --students` wrote, or the course list: by its variants "
     "notebooks are marked.",
 )
 @click.option(
     "--report",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=FOLDER,
     help="Folder of points, feedback for each student and an overview.  [default with --students: "
     "FOLDER-report]",
 )

@@ -7,7 +7,6 @@ import hashlib
 import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,10 +15,9 @@ from kfcourse.notebooks.texts import clean, plain, safe, write_csv
 LONGEST = 100  # characters of a name: it becomes the name of a folder
 
 
-@dataclass(frozen=True)
-class Student:
-    """A line of the course list, the variant it was given, and the sets handed out, if that is
-    known."""
+class Student(NamedTuple):
+    """A line of the course list: name and group; what an assignment adds: the variant given, the
+    sets handed out."""
 
     name: str
     group: str
@@ -30,16 +28,6 @@ class Student:
     def folder(self) -> Path:
         """Of the student's notebooks, in the folder of all."""
         return Path(safe(self.group), safe(self.name))
-
-
-class Row(NamedTuple):
-    """A line of a course list: its number, name and group, and what an assignment adds."""
-
-    line: int
-    name: str
-    group: str
-    variant: str = ""
-    sets: str = ""
 
 
 def assign(path: Path, variants: Sequence[str]) -> list[Student]:
@@ -62,7 +50,7 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
     """
     taken: dict[str, list[str]] = {}
     students: list[Student] = []
-    for row in _distinct(path):
+    for _, row in _distinct(path):
         used = taken.setdefault(row.group, [])
         if len(used) == len(variants):
             used.clear()
@@ -80,7 +68,7 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
 
 def save_assignment(students: Iterable[Student], path: Path) -> None:
     """Write who has which variant, and which sets: `read_assignment` reads it."""
-    write_csv(("name", "group", "variant", "sets"), map(vars, students), path)
+    write_csv(Student._fields, (student._asdict() for student in students), path)
 
 
 def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
@@ -93,40 +81,40 @@ def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
         As `assign`; or a variant is missing in some lines only.
     """
     rows = list(_distinct(path))
-    if not any(row.variant for row in rows):
+    if not any(row.variant for _, row in rows):
         return assign(path, variants)
-    for row in rows:
+    for line, row in rows:
         if not row.variant:
-            raise ValueError(f"{path}, line {row.line}: {row.name} has no variant, and others have")
-    return [Student(row.name, row.group, row.variant, row.sets) for row in rows]
+            raise ValueError(f"{path}, line {line}: {row.name} has no variant, and others have")
+    return [row for _, row in rows]
 
 
-def _distinct(path: Path) -> Iterator[Row]:
-    """The lines of a course list; ValueError if two students would share a folder, or there is
-    none."""
-    seen: dict[str, Row] = {}
-    for row in read_course_list(path):
-        folder = Student(row.name, row.group, "").folder.as_posix()
-        other = seen.setdefault(folder.casefold(), row)
+def _distinct(path: Path) -> Iterator[tuple[int, Student]]:
+    """The lines of a course list with their numbers; ValueError if two students would share a
+    folder, or there is none."""
+    seen: dict[str, tuple[int, Student]] = {}
+    for line, row in read_course_list(path):
+        folder = row.folder.as_posix()
+        number, other = seen.setdefault(folder.casefold(), (line, row))
         if other is row:
-            yield row
+            yield line, row
         elif (other.name, other.group) == (row.name, row.group):
             raise ValueError(
-                f"{path}, line {row.line}: {row.name}, {row.group} stands there twice; add a "
+                f"{path}, line {line}: {row.name}, {row.group} stands there twice; add a "
                 f"middle name"
             )
         else:
             raise ValueError(
-                f"{path}, line {row.line}: the folder of {row.name}, {row.group} would be "
+                f"{path}, line {line}: the folder of {row.name}, {row.group} would be "
                 f"{folder}, as that of {other.name}, "
-                f"{other.group} in line {other.line} (some systems take large and small letters "
+                f"{other.group} in line {number} (some systems take large and small letters "
                 f"for the same); change one name"
             )
     if not seen:
         raise ValueError(f"{path} names no student")
 
 
-def read_course_list(path: Path) -> Iterator[Row]:
+def read_course_list(path: Path) -> Iterator[tuple[int, Student]]:
     """Every student in a CSV file with the columns name and group; an assignment has variant and
     sets, too."""
     try:
@@ -165,16 +153,14 @@ def read_course_list(path: Path) -> Iterator[Row]:
         raise ValueError(f"{path}, line {line + 1}: {error}{quoted}") from None
 
 
-def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Row]:
+def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[tuple[int, Student]]:
     """The row, or none of an empty line; ValueError if it cannot be right."""
     where = f"{path}, line {line}"
     if any("\n" in str(value) for value in values.values()):
         raise ValueError(
             f"{where}: a quote is opened and not closed on the line; remove it, or write it twice"
         )
-    fields = {
-        key: plain((values.get(key) or "").strip()) for key in ("name", "group", "variant", "sets")
-    }
+    fields = {key: plain((values.get(key) or "").strip()) for key in Student._fields}
     if any(str(value).strip() for value in values.get(None) or []):
         raise ValueError(
             f"{where}: more values than columns; put a name that has a comma in it into quotes"
@@ -197,4 +183,4 @@ def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Ro
             raise ValueError(
                 f"{where}: a {key} with characters that cannot be seen, {value!r}; type it anew"
             )
-    yield Row(line, **fields)
+    yield line, Student(**fields)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +109,7 @@ def _for_students(
     if kind == "exercises":
         out.mkdir(parents=True, exist_ok=True)
         save_assignment(
-            [replace(student, sets=" ".join(letters)) for student in given], out / ASSIGNMENT
+            [student._replace(sets=" ".join(letters)) for student in given], out / ASSIGNMENT
         )
         click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
     return [

@@ -36,7 +36,8 @@ def test_equal_formulas_by_value():
     assert equal_formulas([sp.cos(2 * z)], [1 - 2 * sp.sin(z) ** 2], {})
     assert not equal_formulas([sp.Symbol("other")], [z], {})
     assert not equal_formulas([sp.Function("u")(z)], [z], {})
-    assert equal_formulas([sp.Rational(81, 100) * z], [c**2 * z], {c: sp.Rational(9, 10)})
+    assert equal_formulas([c**2 * z], [sp.Rational(81, 100) * z], {c: sp.Rational(9, 10)})
+    assert equal_formulas([c * z, z], [z * c, z], {c: 0.9})
     assert not equal_formulas([sp.Rational(8, 10) * z], [c**2 * z], {c: sp.Rational(9, 10)})
     # Python's own 1/3 and pi are as good as their digits, and a number that was typed shorter is
     # not.

@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 from tiny import asks, c, e, outcome, p, z
 
+from kfcourse.checks.editing import edited
 from kfcourse.checks.equality import Unusable, like
 
 RNG = np.random.default_rng(3)
@@ -61,6 +62,33 @@ FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "
 def test_hints(question, name, answer):
     result = outcome(question, answer)
     assert (result.status, result.diagnosis) == ("wrong", (name,)), result
+
+
+def mixed(a, b):
+    return np.sin(a + 2) / np.sqrt((b + 2) ** 2 + 3) * np.arctan2(a + 1, b + 2)
+
+
+MIXED = asks(mixed, [(RUN[0, 0], RUN[1, 1]), (RUN[2], RUN[3])])
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("inner-sign", "a + 2", "a - 2"),
+        ("quotient", "/ np", "* np"),
+        ("term-lost", " + 3", ""),
+        ("power-lost", " ** 2", ""),
+        ("function-lost", "np.sqrt", ""),
+        ("factor-lost", "np.sin(a + 2) / ", "1 / "),
+        ("number", "3", "4"),
+        ("letter", "(b + 2)", "(a + 2)"),
+        ("order", "a + 1, b + 2", "b + 2, a + 1"),
+    ],
+)
+def test_one_thing_changed_in_the_key_is_named(name, old, new):
+    result = outcome(MIXED, edited(mixed, old, new))
+    assert (result.status, result.diagnosis) == ("wrong", (name,)), result
+    assert "The right answer would give that with" in result.message
 
 
 def test_the_precision_is_named():

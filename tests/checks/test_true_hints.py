@@ -110,16 +110,6 @@ def test_what_is_rounded_up_depends_on_its_arguments():
         ("square", "the square", lambda a, law, s: (-np.sin(a + 1) * s + 1 / law(a)[0]) ** 2),
         ("precision", "rounded", lambda a, law, s: np.round(-np.sin(a + 1) * s + 1 / law(a)[0], 2)),
         ("term", "one number for all", lambda a, law, s: -np.sin(a + 1) * s + 1 / law(a)[0] - a[0]),
-        (
-            "replaced",
-            "with 1 less `s` in the place of `s`",
-            lambda a, law, s: -np.sin(a + 1) * (1 - s) + 1 / law(a)[0],
-        ),
-        (
-            "replaced",
-            "with twice result 1 of `law` in",
-            lambda a, law, s: -np.sin(a + 1) * s + 0.5 / law(a)[0],
-        ),
     ],
 )
 def test_what_was_done_to_the_right_result_is_said(name, words, answer):

@@ -116,8 +116,8 @@ def test_no_check_fails_in_itself(outcomes):
 
 
 def test_most_are_told_what_is_wrong(outcomes):
-    """By a known mistake or a hint.  Of 270 some 15 % are merely wrong, give or take 2: four of
-    these below."""
+    """By a known mistake or a hint.  Of 371 5 % are merely wrong; of the 250 here give or take 1.4:
+    four of these below."""
     told = Counter(
         bool(set(result.diagnosis) - SIZE) for *_, result, _ in outcomes if result.status == "wrong"
     )
@@ -126,4 +126,4 @@ def test_most_are_told_what_is_wrong(outcomes):
         for _, source, result, _ in outcomes
         if result.status == "wrong" and not set(result.diagnosis) - SIZE
     ]
-    assert told[True] >= 0.75 * sum(told.values()), merely
+    assert told[True] >= 0.89 * sum(told.values()), merely

@@ -4,6 +4,7 @@ another."""
 import csv
 import io
 import json
+import shlex
 import shutil
 from contextlib import contextmanager
 from pathlib import Path
@@ -280,6 +281,15 @@ def fill(folder):
     (folder / "list.ipynb").write_text("[1, 2]", encoding="utf-8")
 
 
+FREE = "--sandbox none"
+
+
+def grade(folder, options=""):
+    """The command on a folder, with the tiny masters."""
+    line = f"grade {folder} --masters {FIXTURES} {options}"
+    return CliRunner().invoke(cli.main, shlex.split(line))
+
+
 class Graded(NamedTuple):
     """What the command did: exit status, screen, table by the notebooks' names, and the folder."""
 
@@ -302,17 +312,7 @@ def graded(tmp_path_factory):
             "name,group,variant\nИванов Иван,М-1,53\nПетров,М-1,53\nСидоров,М-1,7\n",
             encoding="utf-8",
         )
-        options = [
-            "--masters",
-            str(FIXTURES),
-            "--seconds",
-            str(SECONDS),
-            "--sandbox",
-            "none",
-            "--students",
-            str(listed),
-        ]
-        result = CliRunner().invoke(cli.main, ["grade", str(folder), *options])
+        result = grade(folder, f"{FREE} --seconds {SECONDS} --students {listed}")
     assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     rows = {
         name.removesuffix(".ipynb"): row
@@ -592,9 +592,8 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, without_running):
         shutil.copy(
             graded.folder.parent / f"returned-grades.{kind}", tmp_path / f"copy-grades.{kind}"
         )
-    options = ["grade", str(tmp_path / "copy"), "--masters", str(FIXTURES), "--sandbox", "none"]
-    options += ["--students", str(graded.folder.parent / "list.csv")]
-    again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
+    folder, options = tmp_path / "copy", f"{FREE} --students {graded.folder.parent / 'list.csv'}"
+    again = grade(folder, f"{options} --seconds {SECONDS}")
     assert again.exit_code == 0
     assert sorted(without_running) == [
         "cut.ipynb",
@@ -609,14 +608,14 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, without_running):
     without_running.clear()
     (tmp_path / "copy" / "shows-results.ipynb").rename(tmp_path / "copy" / "renamed.ipynb")
     change_file(tmp_path / "copy" / "rewrites.ipynb")
-    CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
+    grade(folder, f"{options} --seconds {SECONDS}")
     assert without_running == ["rewrites.ipynb"]
     assert {"renamed.ipynb", "rewrites.ipynb"} < set(table(tmp_path / "copy-grades.csv"))
 
     # what was ended too early may come to its end
-    for more in (["--seconds", str(SECONDS), "--again"], ["--seconds", "99"]):
+    for more in (f"--seconds {SECONDS} --again", "--seconds 99"):
         without_running.clear()
-        CliRunner().invoke(cli.main, [*options, *more])
+        grade(folder, f"{options} {more}")
         assert len(without_running) == 17
 
 
@@ -625,14 +624,13 @@ def test_a_returned_table_of_grades_counts_for_nothing(three, without_running):
     folder = three / "returned"
     folder.mkdir()
     (three / "a.ipynb").rename(folder / "a.ipynb")
-    options = ["grade", str(folder), "--masters", str(FIXTURES), "--sandbox", "none"]
-    assert CliRunner().invoke(cli.main, options).exit_code == 0
+    assert grade(folder, FREE).exit_code == 0
     for kind in ("csv", "jsonl"):
         (three / f"returned-grades.{kind}").rename(folder / f"grades.{kind}")
-    CliRunner().invoke(cli.main, options)
+    grade(folder, FREE)
     assert without_running == ["a.ipynb"] * 2
     for option in ("--out", "--report"):
-        result = CliRunner().invoke(cli.main, [*options, option, str(folder / "new")])
+        result = grade(folder, f"{FREE} {option} {folder / 'new'}")
         assert result.exit_code == 1 and "is inside of what was returned" in result.output
 
 
@@ -640,15 +638,7 @@ def test_without_a_sandbox_nothing_runs_unless_somebody_says_so(
     three, without_running, monkeypatch
 ):
     monkeypatch.setattr(sandbox.shutil, "which", lambda _: None)
-    options = [
-        "grade",
-        str(three),
-        "--out",
-        str(three.parent / f"{three.name}.csv"),
-        "--masters",
-        str(FIXTURES),
-    ]
-    result = CliRunner().invoke(cli.main, options)
+    result = grade(three, f"--out {three.parent / three.name}.csv")
     assert result.exit_code == 1 and without_running == []
     assert (
         "bubblewrap is not installed" in result.output
@@ -739,15 +729,7 @@ def test_a_table_of_its_own_gets_nothing(graded_here, given):
 
 def test_a_list_with_unknown_variants_is_refused(three):
     (three / "list.csv").write_text("name,group,variant\nA,1,mine\n", encoding="utf-8")
-    options = [
-        "grade",
-        str(three),
-        "--masters",
-        str(FIXTURES),
-        "--students",
-        str(three / "list.csv"),
-    ]
-    result = CliRunner().invoke(cli.main, options)
+    result = grade(three, f"--students {three / 'list.csv'}")
     assert result.exit_code == 1
     assert (
         "gives A the variant mine, which is not known; name the file that you handed out with "

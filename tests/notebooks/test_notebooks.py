@@ -3,6 +3,7 @@ the way."""
 
 import ast
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -393,9 +394,7 @@ def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters, monk
 @pytest.fixture
 def call(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return lambda *arguments: CliRunner().invoke(
-        cli.main, [str(argument) for argument in arguments]
-    )
+    return lambda line: CliRunner().invoke(cli.main, shlex.split(line))
 
 
 def refused(result, *words):
@@ -422,18 +421,9 @@ def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(
 
     monkeypatch.setattr(jobs, "execute", instead)  # in this process
     for workers in (1, 2):
-        variants = ("--variant", "53", "--variant", "12")
         result = call(
-            "exercises",
-            *variants,
-            "--sets",
-            "b,c,d",
-            "--masters",
-            masters,
-            "--out",
-            f"out{workers}",
-            "--jobs",
-            workers,
+            f"exercises --variant 53 --variant 12 --sets b,c,d --masters {masters} "
+            f"--out out{workers} --jobs {workers}"
         )
         assert result.exit_code == 1
         failed = [line for line in result.output.splitlines() if line.startswith("FAILED")]
@@ -448,19 +438,7 @@ def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(
     assert first == second
     assert sorted(first) == ["12/b-aof.ipynb", "53/b-aof.ipynb"]
 
-    result = call(
-        "exercises",
-        "--variant",
-        "53",
-        "--sets",
-        "b",
-        "--masters",
-        masters,
-        "--out",
-        "out2",
-        "--jobs",
-        "1",
-    )
+    result = call(f"exercises --variant 53 --sets b --masters {masters} --out out2 --jobs 1")
     assert result.exit_code == 0
     assert ["out2/53", "0", "1", "0"] in [line.split() for line in result.output.splitlines()]
 
@@ -475,20 +453,8 @@ def test_a_variant_that_is_no_model_is_told_at_the_end_and_the_others_are_made(
         ),
         encoding="utf-8",
     )
-    options = (
-        "--all",
-        "--variants",
-        "my.toml",
-        "--sets",
-        "b",
-        "--masters",
-        masters,
-        "--out",
-        "out",
-        "--jobs",
-        "1",
-    )
-    result = call("exercises", *options)
+    options = f"--all --variants my.toml --sets b --masters {masters} --out out --jobs 1"
+    result = call(f"exercises {options}")
     assert result.exit_code == 1
     (line,) = [line for line in result.output.splitlines() if line.startswith("FAILED")]
     assert line.startswith("FAILED variant bad in my.toml: unknown symbol 'z'")
@@ -528,29 +494,23 @@ def test_a_killed_worker_is_told():
 
 
 def test_unknown_names_are_refused(call, tmp_path):
-    refused(call("exercises", "--out", "o"), "name the variants: --variant 53, or --all")
-    refused(call("exercises", "--out", "o", "--variant", "99"), "no variant '99'; there are 53, 1,")
-    refused(
-        call("solutions", "--out", "o", "--variant", "53", "--sets", "b,zz"),
-        "no exercise set zz; there are a, b",
-    )
-    refused(call("solutions", "--out", "o", "--variant", "53", "--sets", ","), "no exercise set")
-    refused(
-        call("exercises", "--out", "o", "--variant", "53", "--variants", "no.toml"),
-        "no file of variants at no.toml",
-    )
-    refused(call("exercises", "--out", "o", "--students", "no.csv"), "no course list no.csv")
-    refused(
-        call("exercises", "--out", "o", "--students", "no.csv", "--nbgrader"),
-        "the same notebooks to all students",
-    )
+    for options, words in (
+        ("exercises", "name the variants: --variant 53, or --all"),
+        ("exercises --variant 99", "no variant '99'; there are 53, 1,"),
+        ("solutions --variant 53 --sets b,zz", "no exercise set zz; there are a, b"),
+        ("solutions --variant 53 --sets ,", "no exercise set"),
+        ("exercises --variant 53 --variants no.toml", "no file of variants at no.toml"),
+        ("exercises --students no.csv", "no course list no.csv"),
+        ("exercises --students no.csv --nbgrader", "the same notebooks to all students"),
+    ):
+        refused(call(f"{options} --out o"), words)
     assert not (tmp_path / "o").exists()
 
 
 def test_two_notebooks_never_share_a_file(call, tmp_path):
     (tmp_path / "list.csv").write_text("name,group\nИванов И.,1\nИванов И,1\n", encoding="utf-8")
     refused(
-        call("exercises", "--out", "o", "--students", "list.csv", "--sets", "b"),
+        call("exercises --out o --students list.csv --sets b"),
         "line 3",
         "Иванов-И",
         "in line 2",
@@ -562,7 +522,7 @@ def test_two_notebooks_never_share_a_file(call, tmp_path):
         encoding="utf-8",
     )
     refused(
-        call("exercises", "--out", "o", "--all", "--variants", "my.toml", "--sets", "b"),
+        call("exercises --out o --all --variants my.toml --sets b"),
         "two notebooks would be",
     )
     assert not (tmp_path / "o").exists()
@@ -575,9 +535,7 @@ def test_a_course_list_makes_a_folder_for_each_student(call, tmp_path, masters, 
     (tmp_path / "list.csv").write_text(
         "name;group\nИванов Иван;М-1\n../../evil;M\n", encoding="utf-8-sig"
     )
-    result = call(
-        "exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters
-    )
+    result = call(f"exercises --students list.csv --out o --sets b,c --masters {masters}")
     assert result.exit_code == 0
     folders = [line.split()[0] for line in result.output.splitlines() if line.startswith("o/")]
     assert folders == ["o/М-1/Иванов-Иван", "o/M/evil"]
