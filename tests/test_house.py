@@ -192,7 +192,7 @@ ROOMS = {
     "book": 50_230,
     "exercises": 40_150,
     "kfcourse/*.py": 6_520,
-    "kfcourse/checks": 19_930,
+    "kfcourse/checks": 20_000,
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_830,
