@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 MOVED = {
+    "better-than-a-tangent": "when-linearisation-fails",
     "checking-exact": "comparison",
     "derive-it": "live-lab",
     "extended-kalman": "linearisation",
+    "integration-limits": "four-sensors",
     "lecture-continuous": "continuous",
+    "manoeuvres": "models-that-jump",
+    "particles": "grid",
+    "radar-extended": "radar-tracking",
 }
 
 

@@ -22,9 +22,7 @@ from kfcourse.derivations import check_text
 from kfcourse.derivations.setting import of_model
 from kfcourse.errors import NotFinite
 from kfcourse.files import replacing_together, save
-from kfcourse.lab import grammar, quality
-from kfcourse.lab.admission import admissions
-from kfcourse.lab.admission import table as table_of_filters
+from kfcourse.lab import admission, grammar, quality
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import (
     LANGUAGES,
@@ -42,6 +40,7 @@ from kfcourse.lab.short_names import (
     LAB,
     check_names,
     has_exact,
+    judging,
     title,
 )
 from kfcourse.lab.variants import RUNS as CHECKED
@@ -189,6 +188,11 @@ def main() -> None:
     help="Language of the report.",
 )
 @click.option(
+    "--scores",
+    is_flag=True,
+    help="Also judge each filter's prediction of the measurement, doubt and all: log score, CRPS.",
+)
+@click.option(
     "--json",
     "json_file",
     type=click.Path(path_type=Path),
@@ -207,6 +211,7 @@ def lab(
     dask: str | None,
     out: Path | None,
     language: str,
+    scores: bool,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
@@ -220,7 +225,7 @@ def lab(
     entries, usual = (JUMP_FILTERS, JUMP_LAB) if jumps else (FILTERS, LAB)
     if names is None:
         bound = bound or has_exact(model)
-        wanted = [*usual, EXACT] if bound else list(usual)
+        wanted = [*usual, *[EXACT] * bound]
         if not bound:
             click.echo(
                 "No bound: point masses do not reach this model; --bound runs particles beside "
@@ -230,7 +235,7 @@ def lab(
     else:
         wanted = _names(names)
     check_names(wanted, entries)
-    known = {answer.name: answer for answer in admissions(model, seconds=DERIVATION)}
+    known = {answer.name: answer for answer in admission.admissions(model, seconds=DERIVATION)}
     answers = [known[name] for name in dict.fromkeys(wanted)]
     refused = {answer.name: answer.reason for answer in answers if answer.built is None}
     remarks: dict[str, list[str]] = {}
@@ -242,16 +247,17 @@ def lab(
                 remarks.setdefault(remark, []).append(title(answer.name))
     for remark, titles in remarks.items():
         click.echo(f"{', '.join(titles)}: {remark}", err=True)
-    if len(refused) == len(answers):
+    filters = [answer.built for answer in answers if answer.built]
+    if not filters:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
         raise click.ClickException(reasons or "give at least one filter: --filters duof")
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    filters = [answer.built for answer in answers if answer.built]
     result = without_failing(
         filters, model, runs, steps or chosen.steps, seed,
         left_out=refused, same_ensemble=same_ensemble, jobs=jobs, dask=dask,
+        scores=judging(model) if scores else None,
     )  # fmt: skip
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -282,6 +288,13 @@ def _tell(result: Comparison, to_error: bool) -> None:
     for name, gap in result.ranking():
         size = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else size}")
+    if result.scored:
+        lines.append("Predictions of the measurement, mean over the steps ± standard error:")
+        lines.append(f"{'':<18} {'log score':>19} {'CRPS':>19}")
+    for name in result.names if result.scored else ():
+        both = [score(name, steps=slice(None)) for score in (result.log_score, result.crps)]
+        shown = [f"{float(mean.value):10.4f} ± {float(mean.standard_error):.4f}" for mean in both]
+        lines.append(f"{title(name):<18} {shown[0]:>19} {shown[1].replace('nan ± nan', '-'):>19}")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 
@@ -309,7 +322,7 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
         raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
     chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
-    click.echo(table_of_filters(admissions(chosen.model, seconds=DERIVATION)))
+    click.echo(admission.table(admission.admissions(chosen.model, seconds=DERIVATION)))
 
 
 @main.command()
@@ -588,9 +601,8 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
             f"the report cannot go to {folder}: {there} is no folder to write to; choose another "
             f"one with --out"
         )
-    if str(json_file) in STANDARD_OUTPUT or json_file is None:
-        return
-    if json_file.is_dir() or not json_file.parent.is_dir():
+    named = str(json_file) not in STANDARD_OUTPUT
+    if json_file and named and (json_file.is_dir() or not json_file.parent.is_dir()):
         raise click.ClickException(
             f"the numbers cannot go to {json_file}: name a file in an existing folder with --json"
         )

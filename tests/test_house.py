@@ -189,22 +189,22 @@ def test_two_copies_of_the_project_are_not_mixed(tmp_path):
 # writes less lowers it.
 ROOMS = {
     "benchmarks": 6_180,
-    "book": 50_230,
+    "book": 50_180,
     "exercises": 40_150,
     "kfcourse/*.py": 6_520,
     "kfcourse/checks": 20_000,
     "kfcourse/continuous": 8_600,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 21_610,
-    "kfcourse/linear": 6_910,
+    "kfcourse/lab": 21_200,
+    "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 10_420,
     "kfcourse/notebooks": 26_810,
     "kfcourse/pages": 10_140,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_730,
     "kfcourse/symbolic": 24_600,
-    "tests": 224_640,
+    "tests": 224_770,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

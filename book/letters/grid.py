@@ -2,8 +2,8 @@
 any distance."""
 
 import numpy as np
-from gate.page import CONDITION
-from gate.values import Of, bell
+from gate.page import CONDITION, DEFINITION, NOTATION, STATED
+from gate.values import Indexed, Of, bell
 from gate.worlds import chain_run
 
 NODES = 7
@@ -58,8 +58,29 @@ keep: \sigma, S', f', g, D_n, D_\xi
 """
 
 
-LETTERS = (bells, course, widths)
+def swarm(rng):
+    """Weighted particles; their moments by NumPy."""
+    x, w = rng.normal(size=4), rng.dirichlet(np.ones(4))
+    return {
+        "x": Indexed(x),
+        "w": Indexed(w),
+        "i": range(4),
+        "k": range(2),
+        "z": Indexed([np.average(x, weights=w)] * 2),
+        "p": Indexed([np.cov(x, aweights=w, ddof=0)] * 2),
+    }
+
+
+LETTERS = (bells, course, widths, swarm)
 SAID = {
+    DEFINITION: [
+        r"x_{k+1}=x_k+u\Bigl(1+\frac1{1+x_k^2}\Bigr)+\xi_k",
+        r"y_k=\sqrt{x_k^2+\rho^2}+n_k",
+    ],
+    STATED: [
+        r"\mathsf M_q\Bigl[F\,\frac pq\Bigr]=\int F(x)\,\frac{p(x)}{q(x)}\,q(x)\,dx=\int F(x)\,p(x)\,dx"
+    ],
+    NOTATION: [r"\frac{N_e}{N}\to\frac{(\mathsf M w)^2}{\mathsf M w^2}"],
     CONDITION: [r"h\le\sigma", r"2e^{-2\pi^2\sigma^2/h^2}=10^{-6}"],
 }
 EQUALS = {

@@ -240,7 +240,7 @@ SAID = {
         r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}",
         r"\varepsilon_k=\varepsilon_{k-1}+\xi_{k-1}",
     ],
-    NOTATION: ["p"],
+    NOTATION: ["p", r"\frac{d}{d\kappa}\mathsf De", r"\mathsf De"],
     CONDITION: [r"\mathcal F+\mathcal G=1", r"\mathcal F=1-\mathcal G"],
 }
 EQUALS = {

@@ -1,13 +1,7 @@
 """The letters of models-that-jump.md: three modes with a joint table of probabilities, mixtures by
 their second moments."""
 
-import numpy as np
 from gate.page import NOTATION
-from gate.values import Operator
-from scipy.stats import multivariate_normal
-
-M, N = 3, 2
-
 
 correcting = r"""
 i: range 3
@@ -47,39 +41,6 @@ forget: T, P, m, V
 """
 
 
-remembering = r"""
-i: range 3
-j: range 3
-m: list 3 any 3
-D: list 3 cov 3
-q: share 3
-\zeta: any 2
-E = \begin{pmatrix}1&0&0\end{pmatrix}
-B = \begin{pmatrix}0&1&0\\0&0&1\end{pmatrix}
-"\Gamma^i" of i = ED_iB^T(BD_iB^T)^{-1}
-"u^i" of i = Em_i+ED_iB^T(BD_iB^T)^{-1}(\zeta-Bm_i)
-"\chi^i" of i = Em_i-ED_iB^T(BD_iB^T)^{-1}Bm_i
-L_i = \mathcal N(\zeta;Bm_i,BD_iB^T)
-w = \sum_iq_iL_i
-\xi_i = q_iL_i/w
-forget: m, D, E, B, w
-"""
-
-
-def nearest(rng):
-    """The mean square about m of a law with the mean mu and the variance s."""
-    mass, x, m = rng.dirichlet(np.ones(4)), rng.normal(size=4), rng.normal()
-    mu, d = mass @ x, rng.uniform(0.5, 2)
-    entropy = {"d": d, r"\mathsf M_f\ln\mathcal N": mass @ multivariate_normal(m, d).logpdf(x)}
-    return entropy | {
-        r"\mathsf M_f": Operator(lambda values: float(mass @ values)),
-        "x": x,
-        "m": m,
-        r"\mu": mu,
-        "s": mass @ (x - mu) ** 2,
-    }
-
-
 failed = r"""
 \nu: num
 a, b: pos
@@ -91,9 +52,25 @@ keep: F, \nu, \ell, \varrho
 """
 
 
-LETTERS = (correcting, predicting, remembering, nearest, failed)
+joined = r"""
+x, y, g, \lambda: num
+\Psi, R: pos
+"2/p" = 2/\Psi+2g^2/R
+"""
+
+
+turned = r"""
+V, v_x, v_y: num
+\omega, T: pos
+\eta = \omega T/2
+"""
+
+
+LETTERS = (correcting, predicting, failed, joined, turned)
 SAID = {
     NOTATION: [
+        r"\mathsf M\ell\big|_{\text{failed}}",
+        r"\mathsf M\ell\big|_{\text{sound}}",
         "x_{k+1}=a^{i_{k+1}}(x_k,v_k)",
         "y_k=b^{i_k}(x_k,w_k)",
         r"\lambda^{\text{before}}",

@@ -2,6 +2,7 @@
 programs."""
 
 import numpy as np
+from gate.page import DEFINITION
 from gate.values import Indexed, Of, Operator, Unread
 from gate.worlds import column, covariance, slope
 from scipy.stats import multivariate_normal
@@ -155,26 +156,6 @@ def one_component(rng):
     }
 
 
-contraction = r"""
-\lambda, y: num
-\Psi, D_n: in .5 1
-S'' = 0.4
-s(x) = 2x+0.2x^2
-t(x) = 2+0.4x
-g(x) = \Psi t(x)/(t(x)^2\Psi+D_n)
-r(x) = \lambda+g(x)(y-s(x)-t(x)(\lambda-x))
-x_* = \lambda
-again:
-x_* = r(x_*)
-then:
-h = 0.001
-\varrho = (8(r(x_*+h)-r(x_*-h))-(r(x_*+2h)-r(x_*-2h)))/(12h)
-K = g(x_*)
-S' = t(x_*)
-keep: \varrho, K, S', S'', x_*, \lambda
-"""
-
-
 fourth_moment = r"""
 n = 3
 \kappa = 2\cdot3/2-n      # (n + kappa)^2 2 w - 1 = 2, with the weight w = 1 / (2 (n + kappa))
@@ -182,7 +163,13 @@ n = 3
 """
 
 
-LETTERS = (iterated, settled, points, posterior, one_component, contraction, fourth_moment)
+LETTERS = (iterated, settled, points, posterior, one_component, fourth_moment)
+SAID = {
+    DEFINITION: [
+        r"S(x)=\begin{pmatrix}\sqrt{s^2+a^2}\\\operatorname{atan2}(a,s)\end{pmatrix}",
+        "y_k=S(x_k)+n_k",
+    ],
+}
 EQUALS = {
     "x_{i+1}": r"\lambda+K\bigl(y-S(x_i)-H(\lambda-x_i)\bigr)",
     r"\mathsf M\,x": r"\lambda",

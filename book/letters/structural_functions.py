@@ -34,12 +34,20 @@ def by_tangents(rng):
     slopes = {
         r"\frac{\partial a}{\partial x}": 0.9 + 0.4 * z,
         r"\frac{\partial a}{\partial v}": 0.5 * z + 0.1,
+        r"\frac{\partial b}{\partial x}": 1.2,
+        r"\frac{\partial b}{\partial w}": 0.4 * z**2 + 0.3,
     }
     return (
         of_package(linearised(MODEL), z, p)
         | slopes
         | {"a": a, "z": z, "m_v": 0.0, "p": p, "D_v": 1.0}
+        | {"b": b, "m": z, "m_w": 0.0, "d": p, "D_w": 1.0}
     )
+
+
+def of_a_sine(rng):
+    m, d = rng.uniform(0.2, 0.9, size=2)
+    return of_package(gaussian(Model.define("x + v", "sin(x) + w")), m, d) | {"m": m, "d": d}
 
 
 over_noise = r"""
@@ -123,7 +131,7 @@ def variant(rng):
     return values | {"e": e, "f": f, "p": p, "d": p, "m": z}
 
 
-LETTERS = (by_tangents, over_noise, in_short, over_state, moments, variant)
+LETTERS = (by_tangents, of_a_sine, over_noise, in_short, over_state, moments, variant)
 SAID = {
     DEFINITION: [
         "x_{k+1}=cx_k+ex_kv_k",

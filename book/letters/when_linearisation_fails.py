@@ -1,7 +1,7 @@
 """The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by
 quadrature."""
 
-from gate.page import CONDITION, NOTATION
+from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.worlds import world
 
 course = r"""
@@ -72,28 +72,61 @@ def again(rng):
     return {r"\kappa": kappa, "n": n, r"\frac{\mathsf Me_n^2}{p_n}": square / claimed}
 
 
-perfect = r"""
-\nu = 1.3
-\lambda: num
-\Psi: pos
-S': in 1 2
-t: in .5 1
-S'' = \nu S'/\sqrt\Psi
-x: nodes \lambda \Psi
-u(x) = S'(x-\lambda)+S''(x-\lambda)^2/2
-h = \mathsf Mu(x)
-F = \mathsf Du(x)
-G = \mathsf M(x-\lambda)u(x)/\Psi
-s = (u(\lambda+t\sqrt\Psi)-h)/(S'\sqrt\Psi)
-keep: \Psi, S', S'', \nu, F, G, t, s
+line = r"""
+m, \alpha, \beta: num
+d: in .2 .5
+x: nodes m d
+s = \mathsf M\sin x
+c = \mathsf M(x-m)\sin x
+v = \mathsf M(\sin(x)-s)^2
+J(a, b) = v+(s-a)^2-2bc+b^2d
+S(x) = \sin x
+keep: J, \alpha, \beta, \mathsf M, S, x, m
 """
 
 
-nearly_straight = perfect.replace("1.3", "0.1")
+second_order = r"""
+\lambda, \Psi, D_n: in .2 .9
+S', S'', y: num
+S = 0.3
+x: nodes \lambda \Psi
+s(x) = S+S'(x-\lambda)+S''(x-\lambda)^2/2
+h = \mathsf Ms(x)
+G = \mathsf M(x-\lambda)s(x)/\Psi
+F = \mathsf M(s(x)-h)^2+D_n
+K = \Psi G/F
+z = \lambda+K(y-h)
+p = \Psi-K^2F
+keep: h, G, F, K, z, p, \lambda, \Psi, y, S, S', S'', D_n
+"""
 
 
-LETTERS = (course, display, western, again, perfect, nearly_straight)
+statistical = r"""
+\lambda, \Psi, D_n: in .2 .9
+y: num
+x: nodes \lambda \Psi
+h = \mathsf M\sin x
+G = \mathsf M(x-\lambda)\sin(x)/\Psi
+F = \mathsf D\sin(x)+D_n
+K = \Psi G/F
+z = \lambda+K(y-h)
+p = \Psi-K^2F
+C = \mathsf M(x-\lambda)\sin x
+P^- = \Psi
+S(x) = \sin x
+S'(x) = \cos x
+"""
+
+
+LETTERS = (course, display, western, again, line, second_order, statistical)
 SAID = {
+    DEFINITION: [
+        r"x_{k+1}=x_k-T\sin x_k+\cos(x_k)\,\xi_k",
+        r"y_k=\sin x_k+n_k",
+        r"x_0\sim\mathcal N(1,\,0.1)",
+        r"x\sim\mathcal N(\lambda,\Psi)",
+    ],
     CONDITION: [r"\nu\ll1", r"\frac34\kappa^2\ll1", r"S'\approx0"],
-    NOTATION: [r"\mathsf{M}[e^2]/p", r"(\mathsf{M}{e})^2/p", r"\mathsf{M}[e^2]/\Psi"],
+    NOTATION: [r"\mathsf{M}[e^2]/p", r"\mathsf{M}[e^2]/\Psi", r"g^2D_\xi"],
 }
+EQUALS = {r"\frac{\mathsf Me_n^2}{p_n}": r"1+\frac{3\kappa^2}{4n}"}

@@ -168,7 +168,7 @@ SET = ExerciseSet(
     QUESTIONS,
     chapters=(
         "radar-tracking",
-        "manoeuvres",
+        "models-that-jump",
     ),
     numbers=radar_numbers,
     about_variant=False,

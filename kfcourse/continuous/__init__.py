@@ -24,6 +24,7 @@ every other:
 sampling     `sampled`: such a model, with unit intensity of its Wiener processes
 integration  `moment_equations` between two measurements, derived; they are integrated with an error
              control
+exact        `pointmass` of a scalar one, by sub-steps between measurements
 benes        `benes_filter`: exact where the drift is tanh(x)
 """
 

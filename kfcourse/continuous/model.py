@@ -13,7 +13,7 @@ import sympy as sp
 from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
     Formula,
@@ -21,7 +21,6 @@ from kfcourse.symbolic.reading import (
     ModelError,
     Names,
     by_name,
-    checked_name,
     exact_number,
     formula_list,
     law,
@@ -103,7 +102,7 @@ class ContinuousModel:
         """
         given = table("parameters", parameters)
         values = {
-            checked_name(name): exact_number(f"parameter {name}", value)
+            check_name(name): exact_number(f"parameter {name}", value)
             for name, value in given.items()
         }
         f, S = (
@@ -129,7 +128,7 @@ class ContinuousModel:
             raise ModelError(
                 f"{', '.join(twice)} named twice: state and parameters need different names"
             )
-        x = tuple(symbol(checked_name(name)) for name in names)
+        x = tuple(symbol(check_name(name)) for name in names)
         known = {"t": symbol("t")} | {name: symbol(name) for name in values} | by_name(x)
         N = law("noise_density", {"variance": noise_density}, len(S)).cov
         # rounding of eigvalsh

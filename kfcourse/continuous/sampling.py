@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,11 @@ import sympy as sp
 
 from kfcourse.angles import on_circle
 from kfcourse.continuous.equations import symmetrised_drift
+from kfcourse.continuous.exact import by_substeps
 from kfcourse.continuous.integration import at_rest, flow_of, rates_of
 from kfcourse.continuous.model import diffusion_rows, numbered
 from kfcourse.errors import expect_sizes
+from kfcourse.filters.base import Filter
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -88,6 +91,10 @@ class Between:
             return Structure(meter.name, model, predict, meter.at(k).measure, transition)
 
         return of_steps(meter.name, model, at)
+
+    def exact(self, model: Model, accuracy: float) -> Filter:
+        """`pointmass` of a scalar model, by sub-steps (`kfcourse.continuous.exact`)."""
+        return by_substeps(model, accuracy, partial(clock, model.known))
 
     def motion(self, model: Model) -> Equation:
         """One interval of a simulation, (x (..., n), noise (..., r substeps), k) -> (..., n); noise

@@ -110,7 +110,7 @@ def admissions(
     return answers
 
 
-def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) -> Admission:
+def _admitted(name: str, entry: Entry, structures: Structures) -> Admission:
     with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
         warnings.simplefilter("always", QuadratureWarning)
         try:
@@ -118,7 +118,7 @@ def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) 
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, error.with_traceback(None))
         faults = [str(warning.message) for warning in caught]
-        if isinstance(structures, Structures):
+        if not structures.jumps:
             faults += {"linearised": _flat, "unscented": _blind}.get(
                 entry.functions, lambda _: iter(())
             )(structures)
@@ -127,7 +127,7 @@ def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) 
         )
 
 
-def _remarks(entry: Entry, structures: Structures | JumpStructures) -> Iterator[str]:
+def _remarks(entry: Entry, structures: Structures) -> Iterator[str]:
     """What is worth knowing of a filter that was built."""
     if entry.functions == "exact" and not has_exact(structures.model):
         yield "by particles, as point masses do not reach this model"

@@ -67,9 +67,8 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
     NoClosedForm
         No order does; the message tells how far the highest order tried is from twice that order.
     """
-    structures = {j: _formulas(mode) for j, mode in enumerate(modes_of(model))}
-    without = {j: modes_of(model)[j] for j, structure in structures.items() if structure is None}
-    size = max(map(axes, without.values()))
+    formulas = [(mode, _formulas(mode)) for mode in modes_of(model)]
+    size = max(axes(mode) for mode, structure in formulas if structure is None)
     problem = ""
     for order in ORDERS:
         if (points := order**size) > MOST:
@@ -79,33 +78,28 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
             )
             break
         try:
-            with warnings.catch_warnings(), np.errstate(all="ignore"):
-                # the pilot looks at more than the prior law
-                warnings.simplefilter("ignore", QuadratureWarning)
-                coarse = {
-                    j: replace(gauss_hermite(mode, order), name="gaussian")
-                    for j, mode in without.items()
-                }
-                apart = float(
-                    np.max(
-                        [
-                            _apart(coarse[j], gauss_hermite(mode, 2 * order))
-                            for j, mode in without.items()
-                        ]
-                    )
-                )
+            tried = [(known, 0.0) if known else _tried(mode, order) for mode, known in formulas]
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
             continue
+        structures, errors = zip(*tried, strict=True)
+        apart = float(np.max(errors))
         if apart <= CLOSE:
-            return Checked(
-                [structure or coarse[j] for j, structure in structures.items()], order, apart
-            )
+            return Checked([*structures], order, apart)
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         problem = (
             f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on "
             f"the laws that occur"
         )
     raise NoClosedForm(f"{why}{problem}", why.kind, **why.parts)
+
+
+def _tried(model: Model, order: int) -> tuple[Structure, float]:
+    """The structure of an order, and how far it is from that of twice the order."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        # the pilot looks at more than the prior law
+        warnings.simplefilter("ignore", QuadratureWarning)
+        coarse = replace(gauss_hermite(model, order), name="gaussian")
+        return coarse, _apart(coarse, gauss_hermite(model, 2 * order))
 
 
 def _formulas(model: Model) -> Structure | None:
@@ -124,9 +118,8 @@ def _apart(coarse: Structure, fine: Structure) -> float:
         raise NotFinite("trajectories become infinite")
     less, more = (run(aof(structure), y) for structure in (coarse, fine))
     # what does not vary has no size of its own but that of rounding
-    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0)) + 1e-12 * (
-        1 + np.abs(more.mean)
-    )
+    rounding = 1e-12 * (1 + np.abs(more.mean))
+    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0)) + rounding
     shift = difference(less.mean, more.mean, model.angles.x) / sd
     spread = (less.cov - more.cov) / (sd[..., :, None] * sd[..., None, :])
     return float(np.max([np.sqrt((part**2).mean(axis=1)).max() for part in (shift, spread)]))

@@ -58,41 +58,37 @@ def propose(seed: int, index: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, index])
 
     def pieces(*kinds: str) -> list[list[Any]]:
-        chosen = []
-        for kind in kinds:
-            weights = np.array([weight for *_, weight in PIECES[kind]])
-            chosen.append(PIECES[kind][rng.choice(len(weights), p=weights / weights.sum())])
-        return chosen
+        weights = [np.array([weight for *_, weight in PIECES[kind]]) for kind in kinds]
+        return [
+            PIECES[kind][rng.choice(len(each), p=each / each.sum())]
+            for kind, each in zip(kinds, weights, strict=True)
+        ]
 
     def uniform(low: float, high: float) -> float:
         return float(f"{rng.uniform(low, high):.2g}")  # numbers to type
 
     if rng.random() < 0.1:  # of ten candidates one is a vector
         force, meter = chosen = pieces("force", "vector_meters")
-        ranges = {"T": (0.05, 0.2), "s": (0.05, 0.3)} | force[2] | meter[2]
+        ranges = {"T": (0.05, 0.2), "s": (0.05, 0.3)}
+        means, variances = [uniform(0.2, 1.0), 0.0], [uniform(0.1, 0.4), uniform(0.1, 0.4)]
         body = {
             "title": f"{force[0]}, {meter[0]}",
             "state": ["x1 + T*x2", f"x2 + T*({force[1]}) + s*v1"],
             "meter": [meter[1]],
-            "prior": {
-                "mean": [uniform(0.2, 1.0), 0.0],
-                "variance": [uniform(0.1, 0.4), uniform(0.1, 0.4)],
-            },
+            "prior": {"mean": means, "variance": variances},
         }
     else:
         chosen = pieces("drift", "object_noise", "signal", "meter_noise")
         (drift, noise, signal, error), ranges = chosen, {}
-        for piece in chosen:
-            ranges |= piece[2]
+        mean, variance = float(rng.choice([0.0, 0.0, 0.5, 1.0])), uniform(0.2, 1.0)
         body = {
             "title": f"{drift[0]}, {noise[0]}; {signal[0]}, {error[0]}",
             "state": f"{drift[1]} + {noise[1]}",
             "meter": f"{signal[1]} + {error[1]}",
-            "prior": {
-                "mean": float(rng.choice([0.0, 0.0, 0.5, 1.0])),
-                "variance": uniform(0.2, 1.0),
-            },
+            "prior": {"mean": mean, "variance": variance},
         }
+    for piece in chosen:
+        ranges |= piece[2]
     return body | {"parameters": {name: uniform(*limits) for name, limits in ranges.items()}}
 
 

@@ -11,7 +11,7 @@ import csv
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ from kfcourse.filters.base import Filter
 from kfcourse.filters.gate import gated
 from kfcourse.lab.report import save_figure, save_texts
 from kfcourse.lab.report_text import lines_of, ranges
-from kfcourse.lab.variants import Variant, VariantError, find_variant, read_variants
+from kfcourse.lab.variants import Variant, VariantError, chosen_variants, find_variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.consistency import Innovations, autocorrelation
 from kfcourse.records.estimation import Likeliest, estimate
@@ -87,7 +87,8 @@ class Analysis(NamedTuple):
 
     def says(self) -> list[str]:
         """The result in sentences."""
-        steps, missing = len(self.record.y), int(np.isnan(self.record.y[:, 0]).all(axis=-1).sum())
+        steps, y, weight = len(self.record.y), self.record.y[:, 0], self.examined.weight[:, 0]
+        missing = int(np.isnan(y).all(axis=-1).sum())
         likelihood = float(self.examined.log_likelihood.sum())
         sentences = [
             f"{steps} rows, {missing} of them without a measurement; log likelihood "
@@ -95,21 +96,16 @@ class Analysis(NamedTuple):
         ]
         if self.gate is not None:
             # with some components at least
-            refused = np.flatnonzero(self.examined.weight[:, 0] < 1)
-            where = ": rows " + ranges((refused[:NAMED] + 1).tolist()) if len(refused) else ""
+            refused = np.flatnonzero(weight < 1) + 1
+            where = ": rows " + ranges(refused[:NAMED].tolist()) if len(refused) else ""
             more = ", ..." if len(refused) > NAMED else ""
             sentences.append(
                 f"The gate refused {len(refused)} of {steps - missing} measurements{where}{more}."
             )
-        if self.likeliest:
-            values = zip(
-                self.likeliest.names,
-                self.likeliest.value,
-                self.likeliest.standard_error,
-                strict=True,
-            )
+        if best := self.likeliest:
+            values = zip(best.names, best.value, best.standard_error, strict=True)
             sentences += [f"{name} = {value:.4g} ± {error:.2g}" for name, value, error in values]
-            sentences += [f"Warning: {flat}." for flat in self.likeliest.flat]
+            sentences += [f"Warning: {flat}." for flat in best.flat]
         return sentences + list(map(judged, self.findings))
 
 
@@ -117,26 +113,26 @@ def judged(finding: Finding) -> str:
     """A finding as a sentence."""
     kind, _, of = finding.name.partition(" of ")
     what, fails = KINDS[kind]
-    within = (
-        f"a filter that is right has {finding.low:.3f} to {finding.high:.3f} in 95 of 100 records"
-    )
+    within = f"{finding.low:.3f} to {finding.high:.3f} in 95 of 100 records"
     verdict = "" if finding.fits else f"; not so here: {fails}"
-    return f"{what}{f', {of}' if of else ''}: {finding.value:.3f} ({within}{verdict})."
+    return (
+        f"{what}{f', {of}' if of else ''}: {finding.value:.3f} (a filter that is right has "
+        f"{within}{verdict})."
+    )
 
 
 def model_of(path: Path, name: str | None) -> Variant:
     """The model of a file of variants: the one named, or the only one."""
     if name is not None:
         return find_variant(name, path)
-    variants, faults = read_variants(path)
-    for fault in faults.values():
-        raise fault
+    variants = chosen_variants([], False, path)
     if len(variants) > 1:
+        names = [variant.name for variant in variants]
         raise VariantError(
             f"{path} has {len(variants)} models; say which: --variant "
-            f"{' or --variant '.join([*variants][:4])}"
+            f"{' or --variant '.join(names[:4])}"
         )
-    return next(iter(variants.values()))
+    return variants[0]
 
 
 def estimate_record(
@@ -214,28 +210,28 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
     """Write estimate.csv, report.html and the figures, all of them or none."""
     model = result.record.model
     names = [symbol.name for symbol in model.x]
-    pictures: dict[str, tuple[str, Callable[[Axes], Axes]]] = {}
+    pictures: dict[str, tuple[str, Callable[[Axes], None]]] = {}
     if track:
-        across, up = map(names.index, track)
-        pictures["track"] = (
-            f"The track: {track[1]} against {track[0]}.",
-            partial(_track, result, across, up),
-        )
+        places = [*map(names.index, track)]
+        about = f"The track: {track[1]} against {track[0]}."
+        pictures["track"] = about, partial(_track, result, places)
     for i, name in enumerate(names):
         about = (
-            f"{name}: the estimate with a band of two standard deviations, and smoothed, "
-            f"given the whole record."
+            f"{name}: the estimate with a band of two standard deviations, and smoothed, given the "
+            "whole record."
         )
-        pictures[f"state-{name}"] = (about, partial(_component, result, i))
+        pictures[f"state-{name}"] = about, partial(_component, result, i)
     for i, name in enumerate(model.measured):
         about = (
             f"Innovations of {name} between bounds of two standard deviations; 95 of 100 lie "
-            f"within if the filter is right."
+            "within if the filter is right."
         )
-        pictures[f"innovations-{name}"] = (about, partial(_innovations, result, i))
-        about = f"Correlation of the innovations of {name} with later ones; between the bounds "
-        about += "in 95 of 100 lags if they are white."
-        pictures[f"whiteness-{name}"] = (about, partial(_whiteness, result, i))
+        pictures[f"innovations-{name}"] = about, partial(_innovations, result, i)
+        about = (
+            f"Correlation of the innovations of {name} with later ones; between the bounds in 95 "
+            "of 100 lags if they are white."
+        )
+        pictures[f"whiteness-{name}"] = about, partial(_whiteness, result, i)
     content = {
         "result": result,
         "model": lines_of(model.latex()),
@@ -253,107 +249,87 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
 def write_numbers(result: Analysis, path: Path) -> None:
     """The CSV file: a row for each row of the record; cells without a number are empty."""
     model, examined = result.record.model, result.examined
+    nu = examined.found
     columns = {}
     for i, symbol in enumerate(model.x):
-        for name, law in (
-            (symbol.name, examined.estimate),
-            (f"{symbol.name}_smoothed", examined.smoothed),
-        ):
-            columns[name], columns[f"{name}_sd"] = law.mean[:, 0, i], _deviation(law.cov, i)
+        for key, law in (("", examined.estimate), ("_smoothed", examined.smoothed)):
+            columns[symbol.name + key] = law.mean[:, 0, i]
+            columns[f"{symbol.name}{key}_sd"] = _deviation(law.cov, i)
     for i, name in enumerate(model.measured):
-        columns[f"{name}_innovation"] = examined.found.value[:, 0, i]
-        columns[f"{name}_innovation_sd"] = _deviation(examined.found.cov, i)
+        columns[f"{name}_innovation"] = nu.value[:, 0, i]
+        columns[f"{name}_innovation_sd"] = _deviation(nu.cov, i)
     columns |= {"weight": examined.weight[:, 0], "log_likelihood": examined.log_likelihood[:, 0]}
     with path.open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
         # names of symbols, and numbers: nothing that a spreadsheet takes for a formula
         rows.writerow(["time", *columns])
-        # with all their digits: stamps of Unix have ten before the point
-        times = result.record.times.tolist()
-        cells = (
-            ["" if np.isnan(value) else f"{value:.10g}" for value in row]
-            for row in zip(*columns.values(), strict=True)
-        )
-        rows.writerows([time, *row] for time, row in zip(times, cells, strict=True))
+        # times with all their digits: stamps of Unix have ten before the point
+        for time, *row in zip(result.record.times.tolist(), *columns.values(), strict=True):
+            rows.writerow([time, *("" if np.isnan(value) else f"{value:.10g}" for value in row)])
 
 
 def _deviation(cov: Array, i: int) -> Array:
     return np.sqrt(cov[:, 0, i, i])
 
 
-def _labelled(ax: Axes, across: str, up: str) -> Axes:
-    ax.set_xlabel(across)
-    ax.set_ylabel(up)
+def _labelled(ax: Axes, across: str, up: str) -> None:
+    ax.set(xlabel=across, ylabel=up)
     ax.grid(True, alpha=0.3)
     if ax.get_legend_handles_labels()[1]:
         ax.legend(fontsize="small")
-    return ax
 
 
-def _component(result: Analysis, i: int, ax: Axes) -> Axes:
+def _curve(ax: Axes, x: Array, y: Array, style: str = "-", half: Any = None, **of: Any) -> None:
+    """A curve, and a band of so much to both sides; of a long record as a picture."""
+    of["rasterized"] = len(x) > MANY
+    ax.plot(x, y, style, linewidth=1, markersize=4, **of)
+    if half is not None:
+        band = {"color": of["color"], "rasterized": of["rasterized"]}
+        ax.fill_between(x, y - half, y + half, alpha=0.2, linewidth=0, **band)
+
+
+def _component(result: Analysis, i: int, ax: Axes) -> None:
     """A component of the state with its band, and smoothed."""
-    times = result.record.times
     for label, (law, colour) in result.laws.items():
-        mean, two, many = law.mean[:, 0, i], 2 * _deviation(law.cov, i), len(times) > MANY
-        ax.plot(times, mean, color=colour, linewidth=1, label=label, rasterized=many)
-        ax.fill_between(
-            times, mean - two, mean + two, color=colour, alpha=0.2, linewidth=0, rasterized=many
-        )
-    return _labelled(ax, "time", result.record.model.x[i].name)
+        half = 2 * _deviation(law.cov, i)
+        _curve(ax, result.record.times, law.mean[:, 0, i], "-", half, color=colour, label=label)
+    _labelled(ax, "time", result.record.model.x[i].name)
 
 
-def _track(result: Analysis, i: int, j: int, ax: Axes) -> Axes:
+def _track(result: Analysis, places: Sequence[int], ax: Axes) -> None:
     """Two components against each other."""
     for label, (law, colour) in result.laws.items():
-        ax.plot(
-            *law.mean[:, 0, [i, j]].T,
-            color=colour,
-            linewidth=1,
-            label=label,
-            rasterized=len(law.mean) > MANY,
-        )
+        _curve(ax, *law.mean[:, 0, places].T, color=colour, label=label)
     ax.set_aspect("equal", adjustable="datalim")
-    return _labelled(ax, result.record.model.x[i].name, result.record.model.x[j].name)
+    _labelled(ax, *(result.record.model.x[i].name for i in places))
 
 
-def _innovations(result: Analysis, i: int, ax: Axes) -> Axes:
+def _innovations(result: Analysis, i: int, ax: Axes) -> None:
     """Innovations of a component of the meter, and what was expected of them."""
-    times, value = result.record.times, result.examined.found.value[:, 0, i]
-    two, many = 2 * _deviation(result.examined.found.cov, i), len(times) > MANY
-    present = ~np.isnan(value)
-    refused = present & ~result.examined.passed[:, 0, i]
-    ax.fill_between(
-        times[present],
-        -two[present],
-        two[present],
-        color=ESTIMATE,
-        alpha=0.2,
-        linewidth=0,
-        rasterized=many,
-    )
-    ax.plot(times[~refused], value[~refused], ".", color=MEASURED, markersize=4, rasterized=many)
+    times, nu = result.record.times, result.examined.found
+    value, two, passed = nu.value[:, 0, i], 2 * _deviation(nu.cov, i), result.examined.passed
+    measured = ~np.isnan(value)
+    refused = measured & ~passed[:, 0, i]
+    zero = np.zeros(measured.sum())
+    _curve(ax, times[measured], zero, "", two[measured], color=ESTIMATE)
+    _curve(ax, times[~refused], value[~refused], ".", color=MEASURED)
     if refused.any():
-        ax.plot(
-            times[refused], value[refused], "x", color=REFUSED, label="refused", rasterized=many
-        )
+        _curve(ax, times[refused], value[refused], "x", color=REFUSED, label="refused")
         ax.set_yscale("symlog", linthresh=float(np.nanmax(two)))
-    return _labelled(ax, "time", f"innovation of {result.record.model.measured[i]}")
+    _labelled(ax, "time", f"innovation of {result.record.model.measured[i]}")
 
 
-def _whiteness(result: Analysis, i: int, ax: Axes) -> Axes:
+def _whiteness(result: Analysis, i: int, ax: Axes) -> None:
     """Autocorrelation of the innovations that were taken, from each to the next ones; nothing of
     fewer than three."""
-    used = result.examined.passed[:, 0, i]
+    used, nu = result.examined.passed[:, 0, i], result.examined.found
     if used.sum() >= 3:
-        value, F = (
-            result.examined.found.value[used][..., [i]],
-            result.examined.found.cov[used][..., [i], :][..., [i]],
-        )
+        value, F = nu.value[used][..., [i]], nu.cov[used][..., [i], :][..., [i]]
         # as for `findings`: a wrong size alone is no correlation
         size = np.mean(value**2 / F[..., 0])
         white = autocorrelation(Innovations(value, size * F), min(LAGS, int(used.sum()) - 1))
         lags, bound = np.arange(1, len(white.value) + 1), normal_bound() * white.standard_deviation
-        ax.fill_between(lags, -bound, bound, color=ESTIMATE, alpha=0.2, linewidth=0)
-        ax.plot(lags, white.value, "o-", color=MEASURED, markersize=4)
+        _curve(ax, lags, 0 * bound, "", bound, color=ESTIMATE)
+        _curve(ax, lags, white.value, "o-", color=MEASURED)
     ax.axhline(0, color="black", linewidth=0.8)
-    return _labelled(ax, "measurements between them", "correlation")
+    _labelled(ax, "measurements between them", "correlation")

@@ -12,7 +12,6 @@ from matplotlib.ticker import MaxNLocator
 
 from kfcourse.lab.families import look
 from kfcourse.lab.short_names import entry, title
-from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised
 from kfcourse.montecarlo.statistics import Estimate
@@ -60,80 +59,48 @@ def _labelled(ax: Axes, ylabel: str, words: Words = ENGLISH) -> Axes:
 
 
 def _curve(
-    ax: Axes,
-    name: str,
-    k: Array,
-    estimate: Estimate,
-    words: Words,
-    confidence: float | None = None,
-    scale: float = 1,
+    ax: Axes, name: str, estimate: Estimate, words: Words, band: bool = False, scale: float = 1
 ) -> None:
-    """A filter's estimates over the steps k, with a band of confidence."""
-    line = style(name) | {"label": words.title(name)}
+    """A filter's estimates over the steps, with a band of confidence if wanted."""
+    line, k = style(name) | {"label": words.title(name)}, np.arange(len(estimate.value))
     ax.plot(k, scale * estimate.value, markersize=4, markevery=max(1, len(k) // 10), **line)
-    if confidence is not None:
-        low, high = estimate.interval(confidence)
+    if band:
+        low, high = estimate.interval()
         ax.fill_between(k, scale * low, scale * high, color=line["color"], alpha=0.15, linewidth=0)
 
 
-def accuracy(
-    result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH
-) -> Axes:
+def accuracy(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
     ax.set_yscale("log")
-    for name in names or result.names:
-        _curve(ax, name, np.arange(result.steps), result.error_variance(name), words)
+    for name in result.names:
+        _curve(ax, name, result.error_variance(name), words)
     ax.grid(True, which="major", alpha=0.3)
     return _labelled(ax, words.variance, words)
 
 
-def relative_accuracy(
-    result: Comparison,
-    ax: Axes,
-    names: Sequence[str] | None = None,
-    steps: slice = slice(None),
-    confidence: float = CONFIDENCE,
-    words: Words = ENGLISH,
-) -> Axes:
+def relative_accuracy(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
     """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands
     of confidence.
 
     Without the exact AOF the control (the Gaussian AOF) is the zero line.
     """
     zero = words.title(result.reference)
-    for name in result.entrants if names is None else names:
+    for name in result.entrants:
         if name != result.reference:
-            _curve(
-                ax,
-                name,
-                np.arange(result.steps)[steps],
-                result.gap(name)[steps],
-                words,
-                confidence,
-                100,
-            )
+            _curve(ax, name, result.gap(name), words, True, 100)
     ax.axhline(0, color="black", linewidth=0.8, label=zero)
     ax.grid(True, alpha=0.3)
     return _labelled(ax, words.above.replace("{name}", zero), words)
 
 
-def ranking(
-    result: Comparison,
-    ax: Axes,
-    steps: slice = slice(None),
-    confidence: float = CONFIDENCE,
-    words: Words = ENGLISH,
-) -> Axes:
+def ranking(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
     """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best
     on top, with intervals."""
-    ranked = result.ranking(steps)[::-1]
+    ranked = result.ranking()[::-1]
     for row, (name, gap) in enumerate(ranked):
-        line, middle = style(name), float(gap.value)
-        low, high = gap.interval(confidence)
-        ends = 100 * np.array([[middle - low], [high - middle]])
-        ax.errorbar(
-            100 * middle, row, xerr=ends, fmt=line["marker"], color=line["color"], capsize=3
-        )
+        line, half = style(name), 100 * float(gap.half_width())
+        form, color = line["marker"], line["color"]
+        ax.errorbar(100 * float(gap.value), row, xerr=half, fmt=form, color=color, capsize=3)
     ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
     ax.set_xlabel(words.mean_above.replace("{name}", words.title(result.reference)))
@@ -145,13 +112,12 @@ def consistency(
     result: Comparison,
     ax: Axes,
     names: Sequence[str] | None = None,
-    confidence: float = CONFIDENCE,
     words: Words = ENGLISH,
 ) -> Axes:
     """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is
     right."""
     for name in names or result.names:
-        _curve(ax, name, np.arange(result.steps), result.normalised_error(name), words, confidence)
+        _curve(ax, name, result.normalised_error(name), words, True)
     ax.axhline(1, color="black", linewidth=0.8)
     ax.set_yscale("log")
     ax.grid(True, alpha=0.3)

@@ -29,7 +29,8 @@ import sympy as sp
 from tqdm import tqdm
 
 from kfcourse.errors import NoClosedForm, NotFinite
-from kfcourse.filters import Design
+from kfcourse.filters import Design, Filter
+from kfcourse.filters.base import State, initial_state
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import LAB, Structures, title
 from kfcourse.lab.variants import RUNS, Variant
@@ -56,6 +57,7 @@ UNSEEN = 0.9
 SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
+UNMEASURED = "without measurements"
 CRITERIA = ("bounded", "observable", "filters differ", "solvable")
 
 
@@ -159,12 +161,13 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     if not moments.ok or not filters:
         return {"bounded": moments}
     try:
-        result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
+        entrants = [*filters, unmeasured(model, x)]
+        result = compare(entrants, model, runs, steps, seed, jobs=1, progress=False)
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
     designed = [built.name for built in filters if isinstance(built, Design)]
     return {
-        "bounded": not_diverging(result, x) or moments,
+        "bounded": not_diverging(result) or moments,
         "observable": observable(result, x),
         "filters differ": differences(result, designed),
     }
@@ -258,25 +261,44 @@ def varies(x: Array) -> Array:
     return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
 
 
-def shares(comparison: Comparison, name: str, x: Array) -> Estimate:
-    """Error variance of a filter over that without measurements, the variance of trajectories x
-    (steps, runs, n); mean over the steps, for each component: (n,).
+def unmeasured(model: Model, x: Array) -> Filter:
+    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs,
+    n)."""
+    means = x.mean(axis=1)
+    u = x - means[:, None]
+    covs = np.einsum("kri,krj->kij", u, u) / x.shape[1]
+
+    def step(state: State, y: Array) -> State:
+        law = Gaussian(np.tile(means[state.step], (len(y), 1)), covs[state.step])
+        return State(state.step + 1, law, law)
+
+    return Filter(UNMEASURED, model, initial_state(model), step)
+
+
+def measured(comparison: Comparison) -> list[str]:
+    """Names of the filters that use the measurements."""
+    return [name for name in comparison.names if name != UNMEASURED]
+
+
+def shares(comparison: Comparison, name: str) -> Estimate:
+    """Error variance of a filter over that without measurements, mean over the steps, for each
+    component: (n,).
 
     Steps where the component does not vary are left out; a component that never varies has the
     share 1.
     """
-    base = x.var(axis=1)
-    used = base > 1e-24 * base.max(axis=0)
-    squares = comparison.sums.means("square")[comparison.names.index(name)]
-    share = np.where(used[..., None], ratio(squares, base[..., None], 0.0), 0.0).sum(axis=0)
-    count = used.sum(axis=0)[:, None]
+    squares = comparison.sums.means("square")
+    square, base = (squares[comparison.names.index(key)] for key in (name, UNMEASURED))
+    used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
+    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0)
+    count = used.sum(axis=0)
     return Estimate.jackknife(np.where(count > 0, share / np.maximum(count, 1), 1.0))
 
 
-def not_diverging(comparison: Comparison, x: Array) -> Finding | None:
+def not_diverging(comparison: Comparison) -> Finding | None:
     """The filter that is DIVERGED times worse than no measurements; None if there is none."""
     worst, name = max(
-        (float(shares(comparison, name, x).value.max()), name) for name in comparison.names
+        (float(shares(comparison, name).value.max()), name) for name in measured(comparison)
     )
     if worst <= DIVERGED:
         return None
@@ -290,7 +312,7 @@ def observable(comparison: Comparison, x: Array) -> Finding:
 
     The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN.
     """
-    estimates = [shares(comparison, name, x) for name in comparison.names]
+    estimates = [shares(comparison, name) for name in measured(comparison)]
     upper = np.min([share.value + 4 * share.standard_error for share in estimates], axis=0)
     worst, names = int(np.argmax(upper)), comparison.model.x
     share = float(min(estimate.value[worst] for estimate in estimates))
@@ -313,7 +335,7 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value:
     the largest significant difference, relative to the error variance of the control.
     """
-    pairs = list(combinations(comparison.names, 2))
+    pairs = list(combinations(measured(comparison), 2))
     tests = max(len(pairs), 1) * (comparison.steps + 1)
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
     control = comparison.error_variance(comparison.control).value

@@ -31,18 +31,16 @@ from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
 from kfcourse.lab.report_modes import JumpReport
 from kfcourse.lab.report_plain import PlainReport
-from kfcourse.lab.report_sections import ROUNDING, StudentReport
+from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
 from kfcourse.lab.short_names import JUMP_FILTERS, title
 from kfcourse.lab.variants import Variant
-from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.writing import by_thousands
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "report.toml").read_text(encoding="utf-8"))
 LANGUAGES = tuple(WORDS)
@@ -105,9 +103,7 @@ def write_report(
             save_figure(partial(FIGURES[name], result, words=labels), place, name)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "modes")
-        save_texts(
-            ("report.html", "report.tex"), place, content, inline=inline_html, inline_tex=inline_tex
-        )
+        save_texts(("report.html", "report.tex"), place, content)
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -127,7 +123,7 @@ def remarks_in_words(result: Comparison) -> list[str]:
     return [text.replace("$", "") for text in _report(result).remarks()]
 
 
-def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
+def save_figure(draw: Callable[[Axes], object], folder: Path, name: str) -> None:
     """A figure for the page and for LaTeX, its legend below it, where no curve runs; the same
     numbers give the same files."""
     figure = Figure(figsize=(7, 4.2), layout="constrained")
@@ -144,27 +140,20 @@ def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
             figure.set_layout_engine("none")  # has been laid out
 
 
-def save_texts(
-    names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]
-) -> None:
-    """The files made from the templates NAME.j2; the templates may use further filters."""
+def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any]) -> None:
+    """The files made from the templates NAME.j2."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    own = {
-        "mathml": _mathml,
-        "tex": escape_tex,
-        "html": jinja2.filters.do_forceescape,
-        "thousands": by_thousands,
-    }
-    environment.filters |= own | filters
+    escape = jinja2.filters.do_forceescape
+    own = {"mathml": _mathml, "tex": escape_tex, "html": escape, "inline": inline_html}
+    environment.filters |= own | {"inline_tex": inline_tex}
     for name in names:
-        (folder / name).write_text(
-            environment.get_template(name + ".j2").render(content), encoding="utf-8"
-        )
+        text = environment.get_template(name + ".j2").render(content)
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
@@ -227,8 +216,8 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     }
 
 
-def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]:
-    """The ranking in sentences: each filter against the next, significant or not at the confidence.
+def conclusions(result: Comparison) -> list[str]:
+    """The ranking in sentences: each filter against the next, significant or not.
 
     In per cent of the bound, the exact AOF's error variance; without it, of the control's.  Filters
     that diverge are left out.
@@ -237,7 +226,7 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
     sentences = []
     for better, worse in pairwise(ranked):
         difference = result.mean_gap_difference(worse, better)
-        low, high = (100 * float(limit) for limit in difference.interval(confidence))
+        low, high = (100 * float(limit) for limit in difference.interval())
         if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model
             sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
             continue
@@ -247,7 +236,7 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
         sentences.append(
             f"{title(better)} {verdict} {title(worse)}: "
             f"{_three_digits(100 * float(difference.value))} % "
-            f"({100 * confidence:g} % confidence: {_three_digits(low)} to {_three_digits(high)} %)."
+            f"({LEVEL} confidence: {_three_digits(low)} to {_three_digits(high)} %)."
         )
     return sentences
 

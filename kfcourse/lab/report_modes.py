@@ -104,15 +104,17 @@ class JumpReport(StudentReport):
         yield self.text("functions_modes")
         for kind in self.kinds:
             yield from self.defined(kind)
-            names = [self.said("in_mode", j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
-            each = [self.of_mode(mode, kind) for _, _, mode in self.numbered]
+            names = [
+                self.phrase("in_mode", j=f"$j={j}$", name=name) for j, name, _ in self.numbered
+            ]
+            each = [self.functions_in(mode, kind) for _, _, mode in self.numbered]
             if all(block == each[0] for block in each):
                 names, each = [words["in_every_mode"]], each[:1]
             for text, block in zip(names, each, strict=True):
                 yield Block("text", text)
                 yield block
 
-    def of_mode(self, mode: Model, kind: str) -> Block:
+    def functions_in(self, mode: Model, kind: str) -> Block:
         """The structural functions of a mode, or why they are not printed."""
         try:
             lines = printed(Structures(mode), kind)
@@ -153,7 +155,7 @@ class JumpReport(StudentReport):
             averaged = entry.functions == "averaged" or entry.family == "duof"
             titles.setdefault("averaged" if averaged else entry.family, []).append(self.title(name))
         lines = [
-            self.said(
+            self.phrase(
                 text, names=", ".join(titles[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$"
             )
             for key, text in about.items()

@@ -59,7 +59,7 @@ class StudentReport:
             lines = [self.translated(line) for line in block.lines]
             yield dataclasses.replace(block, text=self.translated(block.text), lines=lines)
 
-    def said(self, key: str, **values: object) -> str:
+    def phrase(self, key: str, **values: object) -> str:
         """The words of that name, filled with what they speak of."""
         return (
             filled(self.words[key], self.words["thousands"], **values)
@@ -71,7 +71,7 @@ class StudentReport:
         return Block("section", self.words[key])
 
     def text(self, key: str, **values: object) -> Block:
-        return Block("text", self.said(key, **values))
+        return Block("text", self.phrase(key, **values))
 
     def translated(self, text: str) -> str:
         for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
@@ -127,13 +127,13 @@ class StudentReport:
         result, words = self.result, self.words
         yield self.section("experiment")
         sentences = [
-            self.said(
+            self.phrase(
                 "experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed)
             )
         ]
         if result.designed:
             sentences.append(
-                self.said("designs", filters=", ".join(map(self.title, result.designed)))
+                self.phrase("designs", filters=", ".join(map(self.title, result.designed)))
             )
         if result.has_bound:
             sentences.append(words["exact"])
@@ -159,7 +159,7 @@ class StudentReport:
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
             yield Block(
-                "figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [name]
+                "figure", self.phrase(f"figure_{name}", reference=reference, level=LEVEL), [name]
             )
         if "ranking" in self.figures:
             gaps = [
@@ -172,7 +172,7 @@ class StudentReport:
             ]
             yield Block(
                 "table",
-                self.said("ranking_table", reference=reference),
+                self.phrase("ranking_table", reference=reference),
                 [words["filter"], "%"],
                 rows,
             )
@@ -189,7 +189,7 @@ class StudentReport:
                     ", ".join(map(self.title, result.lost)),
                     self.at(np.flatnonzero(mask).tolist()),
                 )
-                yield self.said(f"remark_{kind}", names=whose, at=at)
+                yield self.phrase(f"remark_{kind}", names=whose, at=at)
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
@@ -233,16 +233,18 @@ class StudentReport:
             steps = [
                 k for k, (best, others, _) in enumerate(verdicts) if best == name and not others
             ]
-            yield self.said("leads", name=self.title(name), at=self.at(steps))
+            yield self.phrase("leads", name=self.title(name), at=self.at(steps))
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
         if alone and unsure:  # without a leader it is every step, as has been said
-            yield self.said("together", at=self.at(unsure))
+            yield self.phrase("together", at=self.at(unsure))
         last = [worst for _, _, worst in verdicts if worst]
         if last:
             name = max(set(last), key=lambda name: (last.count(name), name))
-            yield self.said("last", name=self.title(name), steps=last.count(name), all=result.steps)
+            yield self.phrase(
+                "last", name=self.title(name), steps=last.count(name), all=result.steps
+            )
         else:
             yield words["nobody_last"]
         # the control, or its equal
@@ -253,7 +255,9 @@ class StudentReport:
 
     def at(self, steps: list[int]) -> str:
         """At step 2; at steps 0–1, 3–50."""
-        return self.said("at_step" if len(steps) == 1 else "at_steps", where=ranges(steps, "${}$"))
+        return self.phrase(
+            "at_step" if len(steps) == 1 else "at_steps", where=ranges(steps, "${}$")
+        )
 
     def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
@@ -263,8 +267,8 @@ class StudentReport:
         ] or result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
         if len(ranked) == 1 and len(result.entrants) > 1:
-            return self.said("mean_alone", first=self.title(first))
-        return self.said(
+            return self.phrase("mean_alone", first=self.title(first))
+        return self.phrase(
             key,
             first=self.title(result.control if key == "mean_first" else first),
             gap=in_percent(gap),

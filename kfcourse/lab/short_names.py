@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from kfcourse.filters import (
     Design,
@@ -44,60 +44,54 @@ from kfcourse.symbolic.quadrature import gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
-AnyModel = TypeVar("AnyModel", Model, JumpModel)
 
+class Structures:
+    """The structural functions of a model, derived when first asked for; of a model that jumps a
+    list, those of each mode.
 
-class _OfModes(Generic[AnyModel]):
-    """The structural functions of every mode of a model, derived when first asked for."""
+    `normal`: Gaussian, by quadrature if they have no closed form, else NoClosedForm.
+    """
 
-    def __init__(self, model: AnyModel) -> None:
-        self.model: AnyModel = model
+    def __init__(self, model: Model | JumpModel) -> None:
+        self.model: Any = model
+        self.jumps = isinstance(model, JumpModel)
 
     @cached_property
-    def _linearised(self) -> list[Structure]:
-        return [linearised(mode) for mode in modes_of(self.model)]
+    def linearised(self) -> Any:
+        return self._each([linearised(mode) for mode in modes_of(self.model)])
 
     @cached_property
-    def _gaussian(self) -> list[Structure]:
-        return [gaussian(mode) for mode in modes_of(self.model)]
+    def gaussian(self) -> Any:
+        return self._each([gaussian(mode) for mode in modes_of(self.model)])
 
     @cached_property
     def quadrature(self) -> Checked | NoClosedForm | None:
         """What takes the place of the Gaussian functions if they have no closed form, or why
         nothing does; None if they have."""
         try:
-            _ = self._gaussian
+            _ = self.gaussian
         except NoClosedForm as why:
             return _by_quadrature(self.model, why)
         return None
 
     @property
-    def _normal(self) -> list[Structure]:
+    def normal(self) -> Any:
         if isinstance(self.quadrature, NoClosedForm):
             raise self.quadrature
-        return self._gaussian if self.quadrature is None else self.quadrature.structures
+        checked = self.quadrature
+        return self.gaussian if checked is None else self._each(checked.structures)
+
+    def _each(self, structures: list[Structure]) -> Any:
+        return structures if self.jumps else structures[0]
 
 
-class Structures(_OfModes[Model]):
-    """The structural functions of a model.  `normal`: Gaussian, by quadrature if they have no
-    closed form, else NoClosedForm."""
-
-    linearised = property(lambda self: self._linearised[0])
-    gaussian = property(lambda self: self._gaussian[0])
-    normal = property(lambda self: self._normal[0])
-
-
-class JumpStructures(_OfModes[JumpModel]):
+class JumpStructures(Structures):
     """Those of a model that jumps: of each mode, and averaged over the modes."""
-
-    linearised = property(lambda self: self._linearised)
-    gaussian = property(lambda self: self._gaussian)
-    normal = property(lambda self: self._normal)
 
     @property
     def best(self) -> list[Structure]:
         """Gaussian ones if they can be had, else linearised ones."""
-        return self._linearised if isinstance(self.quadrature, NoClosedForm) else self._normal
+        return self.linearised if isinstance(self.quadrature, NoClosedForm) else self.normal
 
     @cached_property
     def averaged(self) -> Structure:
@@ -177,10 +171,10 @@ def _twice(
 
 
 def _built(
-    build: Callable[..., Filter | Design], functions: str, structures: Structures | JumpStructures
+    build: Callable[..., Filter | Design], functions: str, structures: Structures
 ) -> Filter | Design:
     of = structures.normal if functions == "gaussian" else structures.linearised
-    return build(of) if isinstance(structures, Structures) else build(structures.model, of)
+    return build(structures.model, of) if structures.jumps else build(of)
 
 
 def _alone(
@@ -338,6 +332,15 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
         raise ValueError(
             f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(known)}"
         )
+
+
+def judging(model: Model | JumpModel) -> Structure:
+    """The structural functions by which predictions of measurements are judged: the best ones,
+    averaged over modes."""
+    if isinstance(model, JumpModel):
+        return JumpStructures(model).averaged
+    of = Structures(model)
+    return of.linearised if isinstance(of.quadrature, NoClosedForm) else of.normal
 
 
 def exact(model: Model | JumpModel) -> Filter:

@@ -19,8 +19,10 @@ from kfcourse.symbolic.reading import shown
 from kfcourse.symbolic.sense import nothing_random
 
 SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
-TABLES = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes"}
-KEYS = {"title", "steps", "state", "meter", "interval", "angles", "transition", "first"} | TABLES
+KEYS = {
+    "title", "steps", "state", "meter", "interval", "angles", "transition", "first", "parameters",
+    "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes",
+}  # fmt: skip
 # of an object in continuous time
 IN_TIME = {"drift", "diffusion", "instants", "stratonovich", "substeps", "accuracy"}
 OF_STEPS = {"state", "state_noise", "modes", "transition", "first"}
@@ -152,25 +154,20 @@ def read_tables(path: str | Path | None = None, names: Sequence[str] = ()) -> di
     VariantError
         The file is missing or not TOML, or has no variant of such a name.
     """
-    tables = (
-        {name: table for file in SHIPPED for name, table in _shipped(file).items()}
-        if path is None
-        else _tables(Path(path))
-    )
+    if path is None:
+        tables = {name: table for file in SHIPPED for name, table in _shipped(file).items()}
+    else:
+        tables = _tables(Path(path))
     if unknown := [name for name in names if name not in tables]:
-        known = ", ".join([*tables][:MANY]) + (
-            f", ... ({len(tables)} in all)" if len(tables) > MANY else ""
-        )
+        more = f", ... ({len(tables)} in all)" if len(tables) > MANY else ""
+        known = ", ".join([*tables][:MANY]) + more
         raise VariantError(f"no variant {', '.join(map(repr, unknown))}; there are {known}")
     return {name: tables[name] for name in dict.fromkeys(names) or tables}
 
 
 def _shipped(file: str) -> dict[str, Any]:
-    return dict(
-        tomllib.loads((resources.files("kfcourse.lab") / file).read_text(encoding="utf-8"))[
-            "variants"
-        ]
-    )
+    text = (resources.files("kfcourse.lab") / file).read_text(encoding="utf-8")
+    return dict(tomllib.loads(text)["variants"])
 
 
 def _tables(path: Path) -> dict[str, Any]:
@@ -204,21 +201,15 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
-    moves = bool({"drift", "diffusion"} & set(table))
-    keys, needed = (
-        (KEYS - OF_STEPS | IN_TIME, {"drift", "diffusion"}) if moves else (KEYS, {"state"})
-    )
-    unknown, missing = sorted(set(table) - keys), sorted(({"meter"} | needed) - set(table))
+    moves = not {"drift", "diffusion"}.isdisjoint(table)
+    keys = KEYS - OF_STEPS | IN_TIME if moves else KEYS
+    needed = {"meter", "drift", "diffusion"} if moves else {"meter", "state"}
+    unknown, missing = sorted(set(table) - keys), sorted(needed - set(table))
     if unknown or missing:
         problem = (
             f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
         )
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(keys))}")
-    for key in sorted(TABLES & set(table)):
-        if not isinstance(table[key], Mapping):
-            raise VariantError(
-                f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}"
-            )
     try:
         model = sampled_of_table(table) if moves else model_of_table(table)
         steps = table.get("steps", STEPS)
@@ -242,19 +233,19 @@ def summary(name: str, table: Mapping[str, Any]) -> str:
     """Name, title and equations as the table has them; a line for each mode, of what differs
     there."""
     modes: Mapping[str, Mapping[str, Any]] = table.get("modes", {})
-    numbers = [
-        {**table.get("parameters", {}), **mode.get("parameters", {})} for mode in modes.values()
-    ]
+    common = table.get("parameters", {})
+    numbers = [{**common, **mode.get("parameters", {})} for mode in modes.values()]
     formulas = [_equations({**table, **mode}) for mode in modes.values()] or [_equations(table)]
-    common = formulas[:1] if len(set(formulas)) == 1 else []
-    lines = [f"{name:>6}  {on_a_line(str(table.get('title', ''))) or 'no title'}", *common]
+    same = len(set(formulas)) == 1
+    lines = [f"{name:>6}  {on_a_line(str(table.get('title', ''))) or 'no title'}"]
+    lines += formulas[:same]
     for mode, formula, values in zip(modes, formulas, numbers, strict=bool(modes)):
         own = [
             f"{key} = {value:g}"
             for key, value in values.items()
             if any(of.get(key) != value for of in numbers)
         ]
-        lines.append(f"{mode}: {';  '.join(own if common else [formula, *own])}")
+        lines.append(f"{mode}: {';  '.join(own if same else [formula, *own])}")
     return "\n        ".join(lines)
 
 

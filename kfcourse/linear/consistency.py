@@ -92,7 +92,7 @@ def nees(x: Array, posterior: Gaussian, angles: Components = ()) -> Array:
     return normalised_square(difference(x, posterior.mean, angles), _regular(posterior.cov))
 
 
-def nis(found: Innovations) -> Array:
+def nis(nu: Innovations) -> Array:
     """Normalised innovation squared, (steps, runs): mean p for a filter that is right; NaN where y
     is missing.
 
@@ -101,7 +101,7 @@ def nis(found: Innovations) -> Array:
     ValueError
         A covariance is singular: some measurement is claimed to be known before it comes.
     """
-    return normalised_square(found.value, _regular(found.cov))
+    return normalised_square(nu.value, _regular(nu.cov))
 
 
 def _regular(cov: Array) -> Array:
@@ -132,7 +132,7 @@ def chi_squared_bounds(
     return low / runs, high / runs
 
 
-def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
+def alarms(nu: Innovations, confidence: float = CONFIDENCE) -> Array:
     """Which records fail the three tests of innovations: size, mean, whiteness; (3, runs) of bool.
 
     With N steps, p components and s_k = F^(-1/2) nu_k, a right filter makes
@@ -149,7 +149,7 @@ def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
     ValueError
         Measurements are missing.
     """
-    white = _white(found)
+    white = _white(nu)
     steps, _, p = white.shape
     size = (white**2).mean(axis=(0, 2))  # (runs,)
     white = white / np.sqrt(size)[:, None]
@@ -165,13 +165,13 @@ def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
     )
 
 
-def _white(found: Innovations) -> Array:
+def _white(nu: Innovations) -> Array:
     """s_k = F^(-1/2) nu_k, (steps, runs, p)."""
-    if np.isnan(found.value).any():
+    if np.isnan(nu.value).any():
         raise ValueError(
             "this test needs measurements at every step; select the steps at which they are there"
         )
-    return np.linalg.solve(np.linalg.cholesky(found.cov), found.value[..., None])[..., 0]
+    return np.linalg.solve(np.linalg.cholesky(nu.cov), nu.value[..., None])[..., 0]
 
 
 class Autocorrelation(NamedTuple):
@@ -182,17 +182,17 @@ class Autocorrelation(NamedTuple):
     standard_deviation: Array
 
 
-def autocorrelation(found: Innovations, lags: int) -> Autocorrelation:
+def autocorrelation(nu: Innovations, lags: int) -> Autocorrelation:
     """Correlation of whitened innovations s_k = F^(-1/2) nu_k, M[s_k^T s_{k+l}] / p for l = 1 ...
     lags.
 
     The mean is over steps and runs.  White innovations give 0 with the standard deviation 1 /
     sqrt(p * number of pairs).
     """
-    steps, runs, p = found.value.shape
+    steps, runs, p = nu.value.shape
     if not 0 < lags < steps:
         raise ValueError(f"lags must be between 1 and {steps - 1}, got {lags}")
-    white = _white(found)
+    white = _white(nu)
     apart = np.arange(1, lags + 1)
     value = [(white[:-lag] * white[lag:]).sum(axis=-1).mean() / p for lag in apart]
     return Autocorrelation(np.array(value), 1 / np.sqrt(p * runs * (steps - apart)))

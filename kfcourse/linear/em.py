@@ -58,9 +58,9 @@ def em_rounds(system: LinearSystem, prior: Gaussian, y: Array, rounds: int) -> l
 
 def _round(system: LinearSystem, prior: Gaussian, y: Array, measured: Array) -> LinearSystem:
     """Q and R replaced by what is expected of their noises' squares."""
-    A, H, found = system.A, system.H, run(system, prior, y)
-    x, p = smooth(system, found)
-    S = gain(product(found.posterior.cov[:-1], transpose(A)), found.predicted.cov[1:])
+    A, H, filtered = system.A, system.H, run(system, prior, y)
+    x, p = smooth(system, filtered)
+    S = gain(product(filtered.posterior.cov[:-1], transpose(A)), filtered.predicted.cov[1:])
     together = product(A, product(S, p[1:]))  # A Cov(x_k, x_{k+1})
     v = x[1:] - apply(A, x[:-1])
     before = product(product(A, p[:-1]), transpose(A))

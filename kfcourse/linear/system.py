@@ -136,34 +136,24 @@ def _system(
 
 def is_linear(model: Model) -> bool:
     """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
-    sides = (model.difference_equation("a linear system"), model.v), (model.meter_equation, model.w)
-    return all(
-        _constant(_slopes(equation, [*model.x, *noise], model), equation, [*model.x, *noise])
-        for equation, noise in sides
-    )
-
-
-def _constant(
-    slopes: sp.MatrixBase, equation: sp.MatrixBase, variables: Sequence[sp.Symbol]
-) -> bool:
-    """Whether the equation has the same slopes everywhere, and no jumps."""
-    return not slopes.has(*variables, sp.DiracDelta) and not decides(equation, variables)
-
-
-def _slopes(equation: sp.MatrixBase, symbols: Sequence[sp.Symbol], model: Model) -> sp.MatrixBase:
-    return equation.subs(model.values).jacobian(sp.Matrix(symbols)).applyfunc(sp.expand)
+    try:
+        linear_systems(model)
+    except ModelError:
+        return False
+    return True
 
 
 def _affine(
     equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model
 ) -> Stepwise:
     """Matrices of equation = A x + B noise + constant, as a function of the step."""
-    slopes = _slopes(equation, [*x, *noise], model)
-    if not _constant(slopes, equation, [*x, *noise]):
+    numeric, variables = equation.subs(model.values), [*x, *noise]
+    slopes = numeric.jacobian(sp.Matrix(variables)).applyfunc(sp.expand)
+    if slopes.has(*variables, sp.DiracDelta) or decides(equation, variables):
         raise ModelError(
             f"{list(equation)} is not linear, so the Kalman filter does not apply; use "
             f"aof(linearised(model))"
         )
-    constant = equation.subs(model.values).subs(dict.fromkeys([*x, *noise], 0))
+    constant = numeric.subs(dict.fromkeys(variables, 0))
     outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": constant}
     return Stepwise.compile(model.known, "matrices", {}, outputs, ["constant"])

@@ -4,6 +4,7 @@ ensemble    the trajectories that a seed stands for
 designing   coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment  `run`, `predictions`, `compare`: all filters, the exact one too, on the same batches of
             trajectories
+scores      how good predictions of measurements are, doubt and all
 statistics  means over batches, and the jackknife over them
 comparison  `Comparison`: error variances, paired differences, ranking, distance from the exact
             filter

@@ -31,10 +31,12 @@ from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import design, failed
 from kfcourse.montecarlo.ensemble import Instant, instants, weights
 from kfcourse.montecarlo.parallel import cluster, cores
+from kfcourse.montecarlo.scores import scored
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import Structure
 
 # trajectories of a piece of work: a pass over fewer takes as long as the interpreter does
 PIECE = 2500
@@ -140,6 +142,7 @@ def compare(
     design_runs: int | None = None,
     same_ensemble: bool = False,
     smoothers: Sequence[Filter] = (),
+    scores: Structure | None = None,
     jobs: int | None = None,
     dask: str | None = None,
     progress: bool | None = None,
@@ -167,6 +170,9 @@ def compare(
     smoothers : sequence of Filter
         Filters that look back from the end of each record, such as `aof(gaussian(model))`, and
         `pointmass(model)` as their bound; `Comparison.smoothing` tells how good they are.
+    scores : Structure, optional
+        Judge each filter's prediction of the measurement, too (`Comparison.log_score`, `crps`): by
+        these structural functions where a filter has none of its own.
     jobs : int, optional
         How many threads share the work, by default one for each processor core.
     dask : str, optional
@@ -201,13 +207,13 @@ def compare(
     sample = Sample(model, steps, sizes, seeds, None if same_ensemble else width(model))
     with cluster(dask):
         try:
-            result = _compared(ready, sample, seed, jobs, progress)
+            result = _compared(ready, sample, seed, jobs, progress, scores=scores)
         except NotFinite:
             if sample.wide is None:
                 raise
             # some far start is too far: none but the prior's own
             sample = sample._replace(wide=None)
-            result = _compared(ready, sample, seed, jobs, progress)
+            result = _compared(ready, sample, seed, jobs, progress, scores=scores)
         if not same_ensemble:
             result = replace(
                 result, designed=tuple(one.name for one in filters if isinstance(one, Design))
@@ -308,6 +314,7 @@ def _compared(
     progress: bool | None,
     *,
     back: bool = False,
+    scores: Structure | None = None,
 ) -> Comparison:
     """All filters on the sample; one that cannot go on is left out, and the others start again."""
     running, left_out = list(filters), dict[str, Reason]()
@@ -316,7 +323,9 @@ def _compared(
         dear = back or any(one.slow for one in running)
         each = 1 if dear else max(1, PIECE // max(sample.sizes))
         parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
-        work = (joblib.delayed(run_batches)(running, part, back=back) for part in parts)
+        work = (
+            joblib.delayed(run_batches)(running, part, back=back, scores=scores) for part in parts
+        )
         done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
         try:
             sums = Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
@@ -329,7 +338,14 @@ def _compared(
             names = tuple(one.name for one in running)
             runs = sum(sample.sizes)
             return Comparison(
-                sample.model, names, runs, sample.steps, seed, sums, left_out=left_out
+                sample.model,
+                names,
+                runs,
+                sample.steps,
+                seed,
+                sums,
+                left_out=left_out,
+                scored=scores is not None,
             )
 
 
@@ -342,16 +358,22 @@ class LeftOut(Exception):
         self.filter_name, self.reason = filter_name, reason
 
 
-def run_batches(filters: Sequence[Filter], sample: Sample, *, back: bool = False) -> Sums:
+def run_batches(
+    filters: Sequence[Filter],
+    sample: Sample,
+    *,
+    back: bool = False,
+    scores: Structure | None = None,
+) -> Sums:
     """Advance all filters together over the steps of a sample; `back`: let them look back from its
-    end."""
+    end; `scores`: judge what they expect of measurements."""
     starts = np.concatenate([[0], np.cumsum(sample.sizes[:-1])]).astype(int)
     sums = Sums.empty(len(filters), sample.steps, sample.model.n, len(sample.sizes))
     exact = next((i for i, one in enumerate(filters) if one.name == EXACT), None)
     angles = sample.model.angles.x
     # what diverges is reported below, by name
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        for k, (instant, laws) in enumerate((_back if back else _onward)(filters, sample)):
+        for k, (instant, before, laws) in enumerate((_back if back else _onward)(filters, sample)):
             if k == 0:
                 weight = weights(sample.model.prior, instant.x, sample.wide)
                 sums.weight[:] = np.add.reduceat(weight, starts)
@@ -360,6 +382,13 @@ def run_batches(filters: Sequence[Filter], sample: Sample, *, back: bool = False
                 with _named(filters[i], k):
                     x = near(instant.x, state.posterior.mean, angles)
                     sums.record(i, k, x, state.posterior, weight, starts)
+                    if scores is not None:
+                        for field, values in zip(
+                            (sums.log_score, sums.crps),
+                            scored(filters[i], scores, before[i], instant.y, state),
+                            strict=True,
+                        ):
+                            field[i, k] = np.add.reduceat(weight * values, starts)
             if exact is None:
                 continue
             first, second, error = _twice(laws[exact])
@@ -372,17 +401,21 @@ def run_batches(filters: Sequence[Filter], sample: Sample, *, back: bool = False
     return sums
 
 
-def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, list[State]]]:
-    """The states of all filters after each measurement."""
+Stage = tuple[Instant, list[State], list[State]]
+
+
+def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
+    """The states of all filters before and after each measurement."""
     states = [sample.begun(one) for one in filters]
     for k, instant in enumerate(sample.instants()):
+        before = [*states]
         for i, one in enumerate(filters):
             with _named(one, k):
                 states[i] = one.step(states[i], instant.y)
-        yield instant, states
+        yield instant, before, states
 
 
-def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, list[State]]]:
+def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
     """What all filters tell of each step once they have seen the last."""
     record = list(sample.instants())
     y = np.stack([instant.y for instant in record])
@@ -391,7 +424,8 @@ def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, 
         with _named(one, len(record) - 1):
             states = accumulate(y, one.step, initial=sample.begun(one))
             laws.append(looked_back(one, islice(states, 1, None), y))
-    yield from zip(record, map(list, zip(*laws, strict=True)), strict=True)
+    for instant, after in zip(record, map(list, zip(*laws, strict=True)), strict=True):
+        yield instant, [], after
 
 
 def _twice(state: State) -> tuple[Array, Array, Array]:

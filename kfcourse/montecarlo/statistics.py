@@ -129,6 +129,8 @@ class Sums(NamedTuple):
         Of |z - z_exact|^2, if there is an exact filter, else 0.
     largest : ndarray (filters, steps, batches)
         The largest single |e|^2.
+    log_score, crps : ndarray (filters, steps, batches)
+        Of the scores of each filter's prediction of the measurement, if they are asked for, else 0.
     """
 
     weight: Array
@@ -140,12 +142,14 @@ class Sums(NamedTuple):
     normalised: Array
     distance: Array
     largest: Array
+    log_score: Array
+    crps: Array
 
     @classmethod
     def empty(cls, filters: int, steps: int, n: int, batches: int) -> Sums:
         """Room for the sums."""
         full, plain = (filters, steps, n, batches), (filters, steps, batches)
-        shapes = (plain[2:], plain[1:], plain[1:], full, full, plain, plain, plain, plain)
+        shapes = (plain[2:], plain[1:], plain[1:], full, full, *6 * [plain])
         return cls(*map(np.zeros, shapes))
 
     @classmethod

@@ -148,10 +148,8 @@ def estimate(
         except ValueError:
             return np.inf
 
-    t, unit = (
-        np.where(logs, np.log(np.where(logs, start, 1.0)), start),
-        np.where(logs | (start == 0), 1.0, np.abs(start)),
-    )
+    t = np.where(logs, np.log(np.where(logs, start, 1.0)), start)
+    unit = np.where(logs | (start == 0), 1.0, np.abs(start))
     log_likelihood(t)  # says what is wrong with the start
     with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
         # the second time in the units that the likelihood has at its maximum
@@ -187,16 +185,16 @@ def profile(
     """
     expect(model, Model, "profile")
     others = [other for other in unknown if other != name]
-    found = []
+    largest = []
     for value in values:
         model = model.replace(**{name: value})
         if others:
             best = estimate(model, y, others, [other for other in positive if other != name])
             model = best.model  # the next search begins here
-            found.append(best.log_likelihood)
+            largest.append(best.log_likelihood)
         else:
-            found.append(float(likelihood(_normal_filter(model), y).sum()))
-    return np.array(found)
+            largest.append(float(likelihood(_normal_filter(model), y).sum()))
+    return np.array(largest)
 
 
 def _checked(
@@ -289,20 +287,19 @@ def _inverse(
         for i in np.flatnonzero(blind).tolist()
     ]
     scale = np.sqrt(np.where(blind, 1.0, own))
-    related = np.where(
-        blind[:, None] | blind, np.eye(len(own)), information / np.outer(scale, scale)
-    )
+    scaled = information / np.outer(scale, scale)
+    related = np.where(blind[:, None] | blind, np.eye(len(own)), scaled)
     values, directions = np.linalg.eigh(related)
-    told = values > least
-    variance = (directions[:, told] ** 2 / values[told]).sum(axis=1) * (unit / scale) ** 2
+    known = values > least
+    variance = (directions[:, known] ** 2 / values[known]).sum(axis=1) * (unit / scale) ** 2
     variance[blind] = np.inf
-    for direction in directions.T[~told]:
+    for direction in directions.T[~known]:
         part = np.flatnonzero(np.abs(direction) > DIRECTION)
         variance[part] = np.inf
         change = direction[part] * (unit / scale)[part]
         change /= change[np.argmax(np.abs(change))]
         together = ", ".join(
-            f"{names[i]} ({one:+.2g})" for i, one in zip(part.tolist(), change, strict=True)
+            f"{names[i]} ({size:+.2g})" for i, size in zip(part.tolist(), change, strict=True)
         )
         sentences.append(
             f"the record does not tell {together} apart: changed together in these proportions "

@@ -32,12 +32,12 @@ class NoDensity(ValueError):
             f"{name} has no density for the measurement of step {step}, run {run}: the covariance "
             f"expected of it is singular, "
             "or the filter left the finite numbers; give every component of the meter a noise, "
-            "and look at run(one, y) before it"
+            "and look at run(filter, y) before it"
         )
         self.step = step
 
 
-def likelihood(one: Filter, y: Array) -> Array:
+def likelihood(filter_: Filter, y: Array) -> Array:
     """The logarithm of each measurement's density, given all before it: ln p(y_k | y_0, ...,
     y_{k-1}).
 
@@ -45,7 +45,7 @@ def likelihood(one: Filter, y: Array) -> Array:
 
     Parameters
     ----------
-    one : Filter
+    filter_ : Filter
         Whose laws are normal (`aof`, `iterated`, `kalman_filter`); `imm`, for which it is the
         modes' mixture; `pointmass`, for which it is exact; `particle`.
     y : ndarray (steps, runs, p)
@@ -71,15 +71,15 @@ def likelihood(one: Filter, y: Array) -> Array:
     >>> round(likelihood(kalman_filter(local_level()), nile()).sum().item(), 4)
     -641.5856
     """
-    expect(one, Filter, "likelihood")
-    y = measurements(one, y)
-    return log_densities(one, walk(one, y), y)
+    expect(filter_, Filter, "likelihood")
+    y = measurements(filter_, y)
+    return log_densities(filter_, walk(filter_, y), y)
 
 
-def log_densities(one: Filter, visited: Iterable[State], y: Array) -> Array:
+def log_densities(filter_: Filter, visited: Iterable[State], y: Array) -> Array:
     """As `likelihood`, from the filter's states: before the first measurement (steps, runs, p), and
     after each."""
-    evidence = one.evidence or _normal(one)
+    evidence = filter_.evidence or _normal(filter_)
     terms = np.stack(
         [
             evidence(before, now, after)
@@ -87,12 +87,12 @@ def log_densities(one: Filter, visited: Iterable[State], y: Array) -> Array:
         ]
     )
     if not np.isfinite(terms).all():
-        raise NoDensity(one.name, *np.argwhere(~np.isfinite(terms))[0])
+        raise NoDensity(filter_.name, *np.argwhere(~np.isfinite(terms))[0])
     return terms
 
 
-def _normal(one: Filter) -> Evidence:
-    structure = structure_of(one, "the likelihood")
+def _normal(filter_: Filter) -> Evidence:
+    structure = structure_of(filter_, "the likelihood")
 
     def evidence(before: State, y: Array, after: State) -> Array:
         known = after.expected

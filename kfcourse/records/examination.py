@@ -82,13 +82,15 @@ class Finding(NamedTuple):
         return bool(self.low <= self.value <= self.high)
 
 
-def examine(one: Filter, y: Array, edge: float = 1.0, by_component: bool = False) -> Examination:
+def examine(
+    filter_: Filter, y: Array, edge: float = 1.0, by_component: bool = False
+) -> Examination:
     """Run a filter over a record, look back, and keep what it expected.  A long record shows its
     progress.
 
     Parameters
     ----------
-    one : Filter
+    filter_ : Filter
         With structural functions of its own; `gated(...)` too, with its probability as `edge`,
         above 0 and at most 1, and its `by_component`.
     y : ndarray (steps, runs, p)
@@ -101,13 +103,13 @@ def examine(one: Filter, y: Array, edge: float = 1.0, by_component: bool = False
         another shape, no likelihood (`kfcourse.likelihood`), a noise with a negative variance, as
         sqrt(u) has where an input u is negative.
     """
-    expect(one, Filter, "examine")
+    expect(filter_, Filter, "examine")
     if not 0 < edge <= 1:
         raise ValueError(
             f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}"
         )
-    structure, y = structure_of(one, "an examination of a record"), measurements(one, y)
-    visited = list(shown_progress(walk(one, y), "filter", len(y) + 1))
+    structure, y = structure_of(filter_, "an examination of a record"), measurements(filter_, y)
+    visited = list(shown_progress(walk(filter_, y), "filter", len(y) + 1))
     innovations, F = np.empty(y.shape), np.empty((*y.shape, y.shape[-1]))
     for k, (state, after, now) in enumerate(zip(visited[:-1], visited[1:], y, strict=True)):
         expected = structure.at(k).measure(*state.predicted)
@@ -116,20 +118,18 @@ def examine(one: Filter, y: Array, edge: float = 1.0, by_component: bool = False
         if k < len(y) - 1:
             noise = structure.at(k).transition(*after.posterior).Q
             _noise_of(noise, after.predicted.cov, f"the state's noise from step {k} to {k + 1}")
-    passed = ~np.isnan(y)
-    weight = np.stack(
-        [getattr(state.memory, "weight", np.ones(y.shape[1])) for state in visited[1:]]
-    )
+    passed, weight = ~np.isnan(y), np.ones(y.shape[:2])
     for k, state in enumerate(visited[1:]):
+        weight[k] = getattr(state.memory, "weight", 1.0)
         passed[k] &= getattr(state.memory, "passed", weight[k][:, None] > 0)
-    smoothed = looked_back(one, shown_progress(visited[1:], "looking back", len(y)), y)
+    smoothed = looked_back(filter_, shown_progress(visited[1:], "looking back", len(y)), y)
     return Examination(
         stacked([state.posterior for state in visited[1:]]),
         stacked([state.posterior for state in smoothed]),
         Innovations(innovations, F),
         np.where(np.isnan(y).all(axis=-1), np.nan, weight),
         passed,
-        log_densities(one, visited, y),
+        log_densities(filter_, visited, y),
         edge,
         by_component,
     )
@@ -140,13 +140,13 @@ def shown_progress(items: Iterable[T], what: str, total: int) -> Iterator[T]:
     return iter(tqdm(items, desc=what, total=total, unit="row", disable=None, delay=2))
 
 
-def weights(one: Filter, y: Array) -> Array:
+def weights(filter_: Filter, y: Array) -> Array:
     """How much each measurement counted, (steps, runs): 1 in full, 0 refused, NaN where it was
     missing.
 
     Parameters
     ----------
-    one : Filter
+    filter_ : Filter
         `gated(...)` or `robust(...)`.
     y : ndarray (steps, runs, p)
         As for `run`.
@@ -156,19 +156,19 @@ def weights(one: Filter, y: Array) -> Array:
     ValueError
         A filter that weighs nothing, measurements of another shape.
     """
-    expect(one, Filter, "weights")
-    memories = [state.memory for state in islice(walk(one, y), 1, None)]
+    expect(filter_, Filter, "weights")
+    memories = [state.memory for state in islice(walk(filter_, y), 1, None)]
     if not all(hasattr(memory, "weight") for memory in memories):
         raise ValueError(
-            f"{one.name} takes every measurement as it is: ask gated(one) or robust(structure) "
-            f"for weights"
+            f"{filter_.name} takes every measurement as it is: ask "
+            "gated(filter) or robust(structure) for weights"
         )
     return np.stack([memory.weight for memory in memories])
 
 
 def _noise_of(cov: Array, scale: Array, what: str) -> None:
     """ValueError if a variance is negative by more than a rule of quadrature rounds."""
-    variance, whole = (np.diagonal(one, axis1=-2, axis2=-1) for one in (cov, scale))
+    variance, whole = (np.diagonal(matrix, axis1=-2, axis2=-1) for matrix in (cov, scale))
     if (variance < -1e-6 * np.abs(whole)).any():
         raise ValueError(
             f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the "
@@ -182,7 +182,7 @@ def normal_bound() -> float:
     return float(scipy.special.ndtri(TAILS[1]))
 
 
-def findings(told: Examination, run: int = 0) -> list[Finding]:
+def findings(examined: Examination, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
     That of the size is exact without a gate, and behind one that of a gamma law with the same mean
@@ -191,42 +191,34 @@ def findings(told: Examination, run: int = 0) -> list[Finding]:
     enough.  Under weights that are neither 0 nor 1 none of this holds; nothing is found of a record
     that was refused altogether.
     """
-    used, z = told.passed[:, run].any(axis=-1), normal_bound()
+    used, z = examined.passed[:, run].any(axis=-1), normal_bound()
     if not used.any():
         return []
     value, F = (
-        np.where(told.passed[used, run], told.found.value[used, run], np.nan),
-        told.found.cov[used, run],
+        np.where(examined.passed[used, run], examined.found.value[used, run], np.nan),
+        examined.found.cov[used, run],
     )
     degrees = (~np.isnan(value)).sum(axis=-1)
-    if told.by_component:
+    if examined.by_component:
         size = np.nansum(value**2 / np.diagonal(F, axis1=-2, axis2=-1)) / degrees.sum()
-        mean, variance = (degrees * part for part in _below(np.ones(1), told.edge))
+        mean, variance = (degrees * part for part in _below(np.ones(1), examined.edge))
     else:
         size = _sizes(value, F).sum() / degrees.sum()
-        mean, variance = _below(degrees, told.edge)
+        mean, variance = _below(degrees, examined.edge)
     scale = variance.sum() / mean.sum()
     low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, TAILS) / degrees.sum()
     result = [Finding("size", float(size), float(low), float(high))]
-    for i, name in enumerate(_names(value.shape[-1])):
-        there = ~np.isnan(value[:, i])
-        s = value[there, i] / np.sqrt(F[there, i, i])
+    p = value.shape[-1]
+    for i in range(p):
+        measured = ~np.isnan(value[:, i])
+        s = value[measured, i] / np.sqrt(F[measured, i, i])
         if len(s) > 2:
             s = s / np.sqrt(np.mean(s**2))
-            near = float(np.mean(s[:-1] * s[1:]))
-            result.append(
-                Finding(f"mean{name}", float(s.mean()), -z / np.sqrt(len(s)), z / np.sqrt(len(s)))
-            )
-            result.append(
-                Finding(
-                    f"neighbours{name}", near, -z / np.sqrt(len(s) - 1), z / np.sqrt(len(s) - 1)
-                )
-            )
+            name = f" of y{i + 1}" if p > 1 else ""
+            for kind, terms in (("mean", s), ("neighbours", s[:-1] * s[1:])):
+                bound = z / np.sqrt(len(terms))
+                result.append(Finding(kind + name, float(terms.mean()), -bound, bound))
     return result
-
-
-def _names(p: int) -> list[str]:
-    return [""] if p == 1 else [f" of y{i + 1}" for i in range(p)]
 
 
 def _sizes(value: Array, F: Array) -> Array:

@@ -43,7 +43,7 @@ from kfcourse.montecarlo.experiment import measurements, walk
 from kfcourse.symbolic.structure import Structure
 
 
-def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
+def smooth(filter_: Filter, y: Array, lag: int | None = None) -> Gaussian:
     """The states given all measurements of a record: the fixed-interval smoother of a filter.
 
     S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      primes:
@@ -51,7 +51,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
 
     Parameters
     ----------
-    one : Filter
+    filter_ : Filter
         Whose laws are normal: `aof`, `iterated`, `kalman_filter`; `pointmass`, which looks back
         exactly; `particle`.
     y : ndarray (steps, runs, p)
@@ -81,11 +81,11 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan,
     4.0])).mean.ravel().tolist()] [0.944, 1.833, 2.556, 3.278]
     """
-    expect(one, Filter, "smooth")
-    return stacked([state.posterior for state in _looked_back(one, y, lag)])
+    expect(filter_, Filter, "smooth")
+    return stacked([state.posterior for state in _looked_back(filter_, y, lag)])
 
 
-def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
+def smoothing_error(filter_: Filter, y: Array, lag: int | None = None) -> Array:
     """How far the estimates of `smooth` may be from the true means given the record, (steps, runs),
     in the units of x.
 
@@ -114,15 +114,17 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
     >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
     True
     """
-    expect(one, Filter, "smoothing_error")
-    if one.look_back is None:
-        raise unknown_error(one)
-    return np.stack([state.memory.discretisation_error() for state in _looked_back(one, y, lag)])
+    expect(filter_, Filter, "smoothing_error")
+    if filter_.look_back is None:
+        raise unknown_error(filter_)
+    return np.stack(
+        [state.memory.discretisation_error() for state in _looked_back(filter_, y, lag)]
+    )
 
 
-def _looked_back(one: Filter, y: Array, lag: int | None) -> list[State]:
-    y = measurements(one, y)
-    return looked_back(one, islice(walk(one, y), 1, None), y, lag)
+def _looked_back(filter_: Filter, y: Array, lag: int | None) -> list[State]:
+    y = measurements(filter_, y)
+    return looked_back(filter_, islice(walk(filter_, y), 1, None), y, lag)
 
 
 def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:

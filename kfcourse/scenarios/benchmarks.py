@@ -247,7 +247,7 @@ def double_well(a: float, b: float, s: float, **options: Any) -> Model:
     return _model("double_well", parameters={"a": a, "b": b, "s": s}, **options)
 
 
-def benes(interval: float = 0.2, r: float = 0.1, **options: Any) -> Model:
-    """dx = tanh(x) dt + dw, x(0) = 0.1, y = x + w with variance r: as Sarkka and Solin (2019) have
-    it, but for a known start."""
-    return _model("benes", interval=interval, meter_noise={"variance": r}, **options)
+def benes(interval: float = 0.2, **options: Any) -> Model:
+    """dx = tanh(x) dt + dw, x(0) = 0.1, y = x + w with variance 0.1: as Sarkka and Solin (2019)
+    have it, but for a known start."""
+    return _model("benes", interval=interval, **options)

@@ -132,7 +132,6 @@ def follow(
     interval: float,
     u: Array | None = None,
     start: Gaussian | None = None,
-    arithmetic: str = "joseph",
 ) -> Run:
     """Start up from the first three samples, then filter.
 
@@ -149,8 +148,6 @@ def follow(
         acceleration is all noise.
     start : Gaussian, optional
         Law of (x, y, vx, vy) at the third sample, in place of that from `start_up`.
-    arithmetic : str
-        See `kfcourse.linear`.
 
     Returns
     -------
@@ -169,9 +166,8 @@ def follow(
         mean, cov = start_up(y[:3], interval, system.R)
         start = Gaussian(mean[:, :4], cov[:4, :4])
     shift = system.input(None if u is None else u[2])
-    return run(
-        system, predict_law(system, start, shift), y[3:], None if u is None else u[3:], arithmetic
-    )
+    later = None if u is None else u[3:]
+    return run(system, predict_law(system, start, shift), y[3:], later)
 
 
 class Motion(NamedTuple):
@@ -225,33 +221,18 @@ class HandTrack:
 # before its end, or up to PAUSE seconds after it. An overlap of 0.4 keeps the strokes in order (0.4
 # of a stroke of 3500 px is the duration of the shortest), and with it the path between its targets,
 # on the screen.
+SCREEN = (640.0, 400.0)  # width and height, px
 SHORTEST, FITTS, OVERLAP, PAUSE = 100.0, (0.1, 0.15, 20.0), 0.4, 0.3
 
 
-def hand_track(
-    seed: int | np.random.Generator, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)
-) -> HandTrack:
-    """A track like that of a hand: strokes between random targets on a screen, with pauses and
-    overlaps.
-
-    Parameters
-    ----------
-    seed : int or numpy.random.Generator
-    strokes : int
-        A stroke takes about 0.7 s.
-    screen : tuple of float
-        Width and height, px.
-    """
+def hand_track(seed: int | np.random.Generator, strokes: int = 14) -> HandTrack:
+    """A track like that of a hand: strokes between random targets on a screen of 640 x 400 px, with
+    pauses and overlaps; a stroke takes about 0.7 s."""
     expect_sizes(strokes=strokes)
-    if not min(screen) >= 2 * SHORTEST or not np.isfinite(screen).all():
-        raise ValueError(
-            f"strokes are at least {SHORTEST:g} px long: the screen must have twice that, got "
-            f"{screen}"
-        )
     rng = np.random.default_rng(seed)
-    targets = [rng.uniform(0, screen)]
+    targets = [rng.uniform(0, SCREEN)]
     while len(targets) <= strokes:
-        target = rng.uniform(0, screen)
+        target = rng.uniform(0, SCREEN)
         if np.hypot(*(target - targets[-1])) >= SHORTEST:
             targets.append(target)
     displacement = np.diff(targets, axis=0)

@@ -152,19 +152,12 @@ def kinematic(
         )
     expect_positive(interval=interval)
     expect_not_negative(noise_sd=noise_sd, measurement_sd=measurement_sd)
-    axes = "xyz"[:dimensions]
-    names = [prefix + axis for prefix in ("", "v", "a")[: order + 1] for axis in axes]
-    T, state = symbol("T"), [symbol(name) for name in names]
-    noises = [symbol(f"v{i + 1}") for i in range(dimensions)]
-    r, s = state[:dimensions], state[dimensions : 2 * dimensions]
-    acceleration = [
-        a + v for a, v in zip(state[2 * dimensions :] or [0] * dimensions, noises, strict=True)
-    ]
-    equations = [
-        *(ri + T * si + T**2 / 2 * ai for ri, si, ai in zip(r, s, acceleration, strict=True)),
-        *(si + T * ai for si, ai in zip(s, acceleration, strict=True)),
-        *(acceleration if order == 2 else []),
-    ]
+    names = [prefix + axis for prefix in ("", "v", "a")[: order + 1] for axis in "xyz"[:dimensions]]
+    T, state = symbol("T"), sp.Matrix([symbol(name) for name in names])
+    r, s = state[:dimensions, :], state[dimensions : 2 * dimensions, :]
+    a = sp.Matrix([symbol(f"v{i + 1}") for i in range(dimensions)])
+    a += state[2 * dimensions :, :] if order == 2 else sp.zeros(dimensions, 1)
+    equations = [*(r + T * s + T**2 / 2 * a), *(s + T * a), *(a if order == 2 else [])]
     return Model.define(
         equations,
         [ri + symbol(f"w{i + 1}") for i, ri in enumerate(r)],

@@ -15,6 +15,7 @@ that the past tells of the mode is lost.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -45,41 +46,37 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
             f"{len(structures)}"
         )
 
-    def at(k: int) -> Structure:
-        before, after = model.law_at(k), model.law_at(k + 1)
-        now = [structure.at(k) for structure in structures]
+    return of_steps("averaged", model.modes[0], partial(_at, model, structures), timed=True)
 
-        def predict(z: Array, p: Array) -> Gaussian:
-            laws = [structure.predict(z, p) for structure in now]
-            tau = _mean(after, [law.mean for law in laws])
-            return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
 
-        def measure(m: Array, d: Array) -> Measurement:
-            parts = [part.measure(m, d) for part in now]
-            h, G = (
-                _mean(before, [part.h for part in parts]),
-                _mean(before, [part.G for part in parts]),
-            )
-            R = _mean(
-                before, [part.R + _form(part.G - G, d) + _square(part.h - h) for part in parts]
-            )
-            return Measurement(h, G, _form(G, d) + R, R)
+def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:
+    """The average at a step."""
+    before, after = model.law_at(k), model.law_at(k + 1)
+    now = [structure.at(k) for structure in structures]
 
-        def transition(z: Array, p: Array) -> Transition:
-            each, taus = (
-                [structure.transition(z, p) for structure in now],
-                [structure.predict(z, p).mean for structure in now],
-            )
-            tau, A = _mean(after, taus), _mean(after, [part.A for part in each])
-            parts = [
-                Q + _form(slope - A, p) + _square(mean - tau)
-                for (slope, Q), mean in zip(each, taus, strict=True)
-            ]
-            return Transition(A, _mean(after, parts))
+    def predict(z: Array, p: Array) -> Gaussian:
+        laws = [structure.predict(z, p) for structure in now]
+        tau = _mean(after, [law.mean for law in laws])
+        return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
 
-        return Structure("averaged", model.modes[0], predict, measure, transition)
+    def measure(m: Array, d: Array) -> Measurement:
+        parts = [structure.measure(m, d) for structure in now]
+        h, G = (_mean(before, [getattr(part, name) for part in parts]) for name in "hG")
+        spreads = [part.R + _form(part.G - G, d) + _square(part.h - h) for part in parts]
+        R = _mean(before, spreads)
+        return Measurement(h, G, _form(G, d) + R, R)
 
-    return of_steps("averaged", model.modes[0], at, timed=True)
+    def transition(z: Array, p: Array) -> Transition:
+        parts = [structure.transition(z, p) for structure in now]
+        taus = [structure.predict(z, p).mean for structure in now]
+        tau, A = _mean(after, taus), _mean(after, [part.A for part in parts])
+        spreads = [
+            Q + _form(slope - A, p) + _square(mean - tau)
+            for (slope, Q), mean in zip(parts, taus, strict=True)
+        ]
+        return Transition(A, _mean(after, spreads))
+
+    return Structure("averaged", model.modes[0], predict, measure, transition)
 
 
 def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:

@@ -132,16 +132,15 @@ def check_numbers(name: str, matrix: sp.MatrixBase) -> None:
     """ModelError if expressions hold what is no real number, or a number beyond floats."""
     if matrix.has(*NO_NUMBERS):
         raise ModelError(
-            f"{name}: no finite real value, as at the mean of a noise something is divided by 0, "
-            f"or the root of a negative "
-            "number taken; use unscented(model) or gauss_hermite(model), or another mean of the "
-            "noise"
+            f"{name}: no finite real value, as something is divided by 0, or the root of a "
+            "negative number taken; change the parameters, or, if so at the mean of a noise, take "
+            "unscented(model) or gauss_hermite(model), or another mean"
         )
     for number in matrix.atoms(sp.Rational, sp.Float):
         if number and not 2.0**-1022 <= abs(number) < 2**1023:
             raise ModelError(
-                f"the derived functions hold the number {sp.N(number, 3)!s}, beyond what a float "
-                f"can be; change the units"
+                f"{name}: it holds the number {sp.N(number, 3)!s}, beyond what a float can be; "
+                "change the units"
             )
 
 

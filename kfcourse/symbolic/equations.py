@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import exact_matrix
 
 
 class Equation(Protocol):
@@ -42,18 +40,9 @@ def compile_model(model: Model) -> tuple[Equation, Equation]:
 def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
     """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (...,
     n), (..., p)."""
-    meter_equation = model.meter_equation.subs(
-        dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))
-    )
-    meter = _compiled("meter", meter_equation, {"x": model.x}, model)
-    if model.between is not None:
-        motion, still = model.between.motion(model), np.zeros(len(model.v))
-        return lambda x, k=None: motion(x, still, k), lambda x, k=None: meter.at(k)(x)[0]
-    state_equation = model.state_equation.subs(
-        dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True))
-    )
-    state = _compiled("state", state_equation, {"x": model.x}, model)
-    return lambda x, k=None: state.at(k)(x)[0], lambda x, k=None: meter.at(k)(x)[0]
+    state, meter = compile_model(model)
+    v, w = model.state_noise.mean, model.meter_noise.mean
+    return lambda x, k=None: state(x, v, k), lambda x, k=None: meter(x, w, k)
 
 
 def _compiled(

@@ -20,6 +20,8 @@ from typing import Any
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from kfcourse.errors import ModelError
+
 NAMES = "sin cos tan atan atan2 exp log sqrt tanh sinh cosh Abs sign Heaviside"
 FUNCTIONS = {name: getattr(sp, name) for name in NAMES.split()} | {"abs": sp.Abs}
 # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
@@ -64,20 +66,16 @@ def symbol(name: str) -> sp.Symbol:
 
 
 def check_name(name: str) -> str:
-    """Return `name` if it can name a parameter or variable in a formula; raise ValueError if
-    not."""
+    """Return `name` if it can name a parameter or variable in a formula; ModelError if not."""
+    problem = ""
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        raise ValueError(
-            f"{name!r} cannot name a symbol: use letters, digits and _, a letter first"
-        )
-    if keyword.iskeyword(name):
-        raise ValueError(
-            f"{name!r} is a reserved word of Python; choose another name, such as {name}_"
-        )
-    if name in FUNCTIONS or name in CONSTANTS or name == PIECEWISE:
-        raise ValueError(
-            f"{name!r} already means a function or constant in formulas; choose another name"
-        )
+        problem = "cannot name a symbol: use letters, digits and _, a letter first"
+    elif keyword.iskeyword(name):
+        problem = f"is a reserved word of Python; choose another name, such as {name}_"
+    elif name in FUNCTIONS or name in CONSTANTS or name == PIECEWISE:
+        problem = "already means a function or constant in formulas; choose another name"
+    if problem:
+        raise ModelError(f"{name!r} {problem}")
     return name
 
 

@@ -100,26 +100,18 @@ class JumpModel:
         JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x;
         C = 10)
         """
-        tables = _tables(modes)
-        common = table("parameters", parameters)
-        built = []
+        tables, common = _tables(modes), table("parameters", parameters)
+        built, changed = [], set[str]()
         for name, change in tables.items():
-            own = {
-                key: change[key] for key in change if key not in ("state", "meter", "parameters")
-            }
             try:
-                values = {**common, **table("parameters", change.get("parameters"))}
-                parts = change.get("state", state), change.get("meter", meter)
-                built.append(Model.define(*parts, values, **{**options, **own}))
+                own = table("parameters", change.get("parameters"))
+                given = {"state": state, "meter": meter, **options, **change}
+                built.append(Model.define(**given | {"parameters": {**common, **own}}))
             except (ModelError, FormulaError) as error:
                 raise ModelError(f"mode {name}: {error}") from None
+            changed |= set(own)
         fitting = _fitting(tuple(tables), built)
         chain, rows = _chain(transition, len(built))
-        changed = {
-            name
-            for change in tables.values()
-            for name in table("parameters", change.get("parameters"))
-        }
         matrix, of_step = _compiled(chain, fitting[0], common, changed)
         if rows == 1 and first is None and not matrix.has(*fitting[0].x):
             first = np.asarray(of_step.at(0)()[0], dtype=float)[0].tolist()
@@ -259,22 +251,12 @@ def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
         if spare := sorted({"transition", "first"} & set(given)):
             raise ModelError(f"`{spare[0]}` is of a model with `modes`, and there are none")
         return Model.of_table(given)
-    if "transition" not in given:
+    if missing := {"state", "meter", "transition"} - set(given):
         raise ModelError(
-            "a model with `modes` needs `transition`, a matrix of probabilities whose rows sum to 1"
+            f"a model with `modes` has no {' and no '.join(sorted(missing))}: give what holds in "
+            "all modes, and `transition`, a matrix of probabilities whose rows sum to 1"
         )
-    missing = [key for key in ("state", "meter") if key not in given]
-    if missing:
-        raise ModelError(
-            f"there is no {' and no '.join(missing)}: give what holds in all modes that have none "
-            f"of their own"
-        )
-    options = {
-        key: value
-        for key, value in given.items()
-        if key not in ("state", "meter", "parameters", *OF_A_VARIANT)
-    }
-    return JumpModel.define(given["state"], given["meter"], given.get("parameters"), **options)
+    return JumpModel.define(**{key: given[key] for key in given if key not in OF_A_VARIANT})
 
 
 def _tables(modes: Any) -> dict[str, dict[str, Any]]:
@@ -295,23 +277,18 @@ def _tables(modes: Any) -> dict[str, dict[str, Any]]:
 
 def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...]:
     """The modes, if they are of one state, measurement and noises; ModelError if not."""
-    first = modes[0]
+
+    def sizes(mode: Model) -> dict[str, int]:
+        noises = {"noise(s) of the object": len(mode.v), "noise(s) of the meter": len(mode.w)}
+        return {"state component(s)": mode.n, "measurement component(s)": mode.p} | noises
+
+    first, needed = modes[0], sizes(modes[0])
     for name, mode in zip(names, modes, strict=True):
-        for what, here, there in (
-            ("state component(s)", first.n, mode.n),
-            ("measurement component(s)", first.p, mode.p),
-            ("noise(s) of the object", len(first.v), len(mode.v)),
-            ("noise(s) of the meter", len(first.w), len(mode.w)),
-        ):
-            if here != there:
-                remedy = (
-                    '; name them all by `symbols`, such as v = ["v1", "v2"]'
-                    if what.startswith("noise")
-                    else ""
-                )
+        for what, size in sizes(mode).items():
+            if size != needed[what]:
                 raise ModelError(
-                    f"all modes need as many {what}: mode {names[0]} has {here}, mode {name} has "
-                    f"{there}{remedy}"
+                    f"all modes need as many {what}: mode {names[0]} has {needed[what]}, mode "
+                    f'{name} has {size}; name noises by `symbols`, such as v = ["v1", "v2"]'
                 )
         if mode.x != first.x or mode.angles != first.angles:
             raise ModelError(
@@ -372,17 +349,14 @@ def _compiled(
 
 
 def _law(first: Any, size: int) -> Array:
-    if first is None:
-        raise ModelError(
-            "`first` is missing: the probabilities of the modes at the first measurement"
-        )
     try:
         law = np.asarray(first, dtype=float)
     except (TypeError, ValueError):
         law = np.array(np.nan)
     if law.shape != (size,):
         raise ModelError(
-            f"`first` must be {size} probabilities for {size} mode(s), got {shown(first)}"
+            f"`first` must be {size} probabilities for {size} mode(s), those of the modes at the "
+            f"first measurement; got {shown(first)}"
         )
     if problem := _not_probabilities(law[None]):
         raise ModelError(f"`first`: {problem}")

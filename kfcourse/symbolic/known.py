@@ -16,10 +16,9 @@ import sympy as sp
 
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import Compiled, compile_function
-from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
     ModelError,
-    checked_name,
     exact_number,
     of_numbers,
     read,
@@ -55,7 +54,7 @@ class Known:
                 f"the interval between two steps must be positive, got {shown(interval)}"
             )
         values = {
-            checked_name(name): _sequence(name, given)
+            check_name(name): _sequence(name, given)
             for name, given in table("inputs", inputs).items()
         }
         return cls((), length, values)
@@ -190,22 +189,12 @@ def varying_law(
     """
     law, size = table(what, given), len(noises)
     variance = law.get("variance")
-    entries = (
-        [variance] * size
-        if _is_formula(variance)
-        else [*variance]
-        if isinstance(variance, Sequence)
-        else []
-    )
-    if any(
-        any(map(_is_formula, row))
-        for row in entries
-        if isinstance(row, Sequence) and not isinstance(row, str)
-    ):
+    entries = variance if isinstance(variance, Sequence) else []
+    entries = [variance] * size if _is_formula(variance) else [*entries]
+    if any(isinstance(row, list | tuple) and any(map(_is_formula, row)) for row in entries):
         raise ModelError(
             f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that "
-            f"change with time into the "
-            "equation, as in (1 + k)*v1 + k*v2"
+            "change with time into the equation, as in (1 + k)*v1 + k*v2"
         )
     formulas = {
         i: read(entry, symbols, what) for i, entry in enumerate(entries) if _is_formula(entry)

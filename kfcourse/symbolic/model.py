@@ -24,14 +24,13 @@ import sympy as sp
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees, warn_of_meters
-from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
     Names,
     by_name,
-    checked_name,
     exact_matrix,
     exact_number,
     formula_list,
@@ -41,7 +40,7 @@ from kfcourse.symbolic.reading import (
     shown,
     table,
 )
-from kfcourse.symbolic.sense import not_computable
+from kfcourse.symbolic.sense import check_computable
 from kfcourse.symbolic.typesetting import with_index
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
@@ -150,7 +149,7 @@ class Model:
         """
         given = table("parameters", parameters)
         values = {
-            checked_name(name): exact_number(f"parameter {name}", value)
+            check_name(name): exact_number(f"parameter {name}", value)
             for name, value in given.items()
         }
         a, b, known = (
@@ -213,8 +212,7 @@ class Model:
             ("meter", self.meter_equation, self.w, self.meter_noise),
         ):
             means = dict(zip(noise, exact_matrix(noise_law.mean), strict=True))
-            if problem := not_computable(equation, self.values, means):
-                raise ModelError(f"the {what} equation {problem}")
+            check_computable(f"the {what} equation", equation, self.values, means)
 
     @property
     def n(self) -> int:
@@ -272,16 +270,9 @@ class Model:
     def of_table(cls, table: Mapping[str, Any]) -> Model:
         """The model of a table such as [variants.53]: its keys are the arguments of `define`, but
         for title and steps."""
-        try:
-            state, meter = table["state"], table["meter"]
-        except (KeyError, TypeError):
-            raise ModelError(f"expected a table with state and meter, got {shown(table)}") from None
-        options = {
-            key: value
-            for key, value in table.items()
-            if key not in ("state", "meter", "parameters", *OF_A_VARIANT)
-        }
-        return cls.define(state, meter, table.get("parameters"), **options)
+        if not isinstance(table, Mapping) or not {"state", "meter"} <= set(table):
+            raise ModelError(f"expected a table with state and meter, got {shown(table)}")
+        return cls.define(**{key: table[key] for key in table if key not in OF_A_VARIANT})
 
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
         """The same model with other values of its inputs, or of the time t: those of a record.
@@ -308,8 +299,8 @@ class Model:
         Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
         """
         x, v, w = (
-            [sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in some]
-            for some in (self.x, self.v, self.w)
+            [sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in group]
+            for group in (self.x, self.v, self.w)
         )
         at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
         state, moves = [sp.latex(x) for x in self.x], self.between is not None
@@ -373,16 +364,16 @@ def _symbols(
         raise ModelError(
             f"`symbols` has the keys x, v, w, not {', '.join(sorted(set(given) - set('xvw')))}"
         )
-    result = {}
+    result: dict[str, list[str]] = {}
+    names: Sequence[str]
     for key in "xvw":
         if key in given:
-            listed = [given[key]] if isinstance(given[key], str) else given[key]
-            if not isinstance(listed, Sequence):
+            names = [given[key]] if isinstance(given[key], str) else given[key]
+            if not isinstance(names, Sequence) or not names:
                 raise ModelError(
                     f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", '
-                    f'"{key}2"], got {shown(listed)}'
+                    f'"{key}2"], got {shown(names)}'
                 )
-            names: list[str] = [*listed]
         elif key == "x":
             names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
         else:
@@ -392,11 +383,7 @@ def _symbols(
                 if re.fullmatch(key + r"[1-9][0-9]?", name)
             ]
             names = [f"{key}{i + 1}" for i in range(max(numbers))] if numbers else [key]
-        if not names and key != "x":
-            raise ModelError(
-                f"`symbols` names no {key}; leave the key out, or give at least one name"
-            )
-        result[key] = [checked_name(name) for name in names]
+        result[key] = [check_name(name) for name in names]
     every = [name for names in result.values() for name in names] + [*values]
     twice = sorted({name for name in every if every.count(name) > 1})
     if twice:

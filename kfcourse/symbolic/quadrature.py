@@ -146,62 +146,91 @@ def product_rule(order: int) -> Rule:
 
 
 class _Side(NamedTuple):
-    """An equation of the model as f(x, noises, k), and what noises without points add to the
-    covariance."""
+    """An equation of the model as f(x, noises, k), what noises without points add to the
+    covariance, and a rule's points, standard normal, with their weights."""
 
+    model: Model
     function: Callable[..., Array]
-    size: int
-    axes: int  # variables with points: the state, and noises
     mean: Array  # of all noises
     root: Array  # of the covariance of the noises with points, columns for them only
     factors: Stepwise  # B D B^T of those without points
     of_state: bool  # whether it depends on the state
     angles: Components  # components of the function's value
+    size: int
+    points: Array = np.empty((0, 0))
+    weights: Array = np.empty(0)
 
-    def added(self, x: Array, weights: Array, k: int | None) -> Array:
+    @property
+    def axes(self) -> int:
+        """How many variables have points: the state, and noises."""
+        return self.model.n + self.root.shape[1]
+
+    def added(self, x: Array, k: int | None) -> Array:
         """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given
         x."""
         if not self.of_state:
             return symmetric(self.factors.at(k)()[0])
         covs = np.broadcast_to(self.factors.at(k)(x)[0], (*x.shape[:-1], self.size, self.size))
-        return symmetric(np.einsum("q,...qij->...ij", weights, covs))
+        return symmetric(np.einsum("q,...qij->...ij", self.weights, covs))
+
+    def propagated(self, mean: Array, cov: Array, k: int | None) -> tuple[Array, ...]:
+        """A law of the state through the function: its mean, its deviations from that at the points
+        (0 exactly for what does not vary), deviations of x, the root of cov with 1 for what is
+        known, and the covariance that noises without points add."""
+        n = self.model.n
+        root, known = _lower_root(cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n)))
+        dx = np.where(known[..., None, :], 0.0, self.points[:, :n]) @ transpose(root)
+        _warn_of_turns(self.model, dx)
+        x = mean[..., None, :] + dx
+        noise = self.mean + self.points[:, n:] @ self.root.T
+        values = self.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]), k)
+        values = np.broadcast_to(values, (*x.shape[:-1], self.size))
+        middle = values[..., np.argmin((self.points**2).sum(axis=1)), :]
+        off = difference(values, middle[..., None, :], self.angles)
+        shift = self.weights @ off
+        value, deviation = on_circle(middle + shift, self.angles), off - shift[..., None, :]
+        return value, deviation, dx, root, self.added(x, k)
+
+    def spread(self, deviation: Array) -> Array:
+        return symmetric(transpose(deviation * self.weights[:, None]) @ deviation)
+
+    def regressed(self, mean: Array, cov: Array, k: int | None) -> tuple[Array, Array, Array]:
+        """Mean of the function, its slopes by x, and the covariance of what is not linear in x:
+        regressions on the points."""
+        value, deviation, dx, root, added = self.propagated(mean, cov, k)
+        weighed = deviation * self.weights[:, None]
+        cross = transpose(weighed) @ self.points[:, : self.model.n]
+        # A sum over points that ought to cancel leaves some units of precision: as a gain a
+        # measurement in disguise.
+        variance = np.maximum((weighed * deviation).sum(axis=-2), 0.0)
+        cross = np.where(np.abs(cross) <= LOST * np.sqrt(variance)[..., None], 0.0, cross)
+        slopes = transpose(np.linalg.solve(transpose(root), transpose(cross)))
+        explained = dx @ transpose(slopes)
+        rest = deviation - explained  # no difference of nearly equal matrices
+        size = (np.abs(deviation) + np.abs(explained)).max(axis=-2, keepdims=True)
+        size = size + np.abs(value)[..., None, :]
+        rest = np.where(np.abs(rest) <= LOST * size, 0.0, rest)  # rounding is no noise of the meter
+        return value, slopes, self.spread(rest) + added
 
 
 def _sides(model: Model, with_factors: bool = False) -> tuple[_Side, _Side]:
     """Object and meter, with points for the noises that do not enter linearly, or for those
     `with_factors` of the state, too."""
     state, meter = compile_model(model)
-    return (
-        _side(
-            state,
-            model.state_equation,
-            model.v,
-            model.state_noise,
-            model.angles.x,
-            model,
-            with_factors,
-        ),
-        _side(
-            meter,
-            model.meter_equation,
-            model.w,
-            model.meter_noise,
-            model.angles.y,
-            model,
-            with_factors,
-        ),
+    of = (
+        (state, model.state_equation, model.v, model.state_noise, model.angles.x),
+        (meter, model.meter_equation, model.w, model.meter_noise, model.angles.y),
     )
+    first, second = (_side(model, with_factors, *parts) for parts in of)
+    return first, second
 
 
 def _side(
-    function, formulas, noises, law: Gaussian, angles: Components, model: Model, with_factors: bool
+    model: Model, with_factors: bool, function, formulas, noises, law: Gaussian, angles: Components
 ) -> _Side:
     size, count = len(formulas), len(noises)
-    factors = (
-        sp.Matrix(formulas).subs(model.values).jacobian(list(noises))
-        if noises
-        else sp.zeros(size, 0)
-    )
+    slopes = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if count else []
+    factors = sp.Matrix(size, count, list(slopes))
     varying = (*model.x, *noises) if with_factors else noises
     columns = [factors[:, j] for j in range(count)]
     other = np.array(
@@ -221,9 +250,7 @@ def _side(
     stepwise = Stepwise.compile(model.known, "added", arguments, {"added": added}, [*arguments])
     root = np.zeros((count, int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Side(
-        function, size, model.n + root.shape[1], law.mean, root, stepwise, bool(arguments), angles
-    )
+    return _Side(model, function, law.mean, root, stepwise, bool(arguments), angles, size)
 
 
 def _checked(name: str, model: Model, rule: Rule, sides: Sequence[_Side], order: int) -> Structure:
@@ -280,13 +307,13 @@ def _warn(text: str, stacklevel: int) -> None:
     warnings.warn(text, QuadratureWarning, stacklevel=stacklevel)
 
 
-def _warn_of_turns(name: str, model: Model, deviation: Array) -> None:
+def _warn_of_turns(model: Model, deviation: Array) -> None:
     """QuadratureWarning if points of an angle go round the circle: their mean is then that of other
     angles."""
     for i in model.angles.x:
         if (widest := np.nanmax(np.abs(deviation[..., i]), initial=0.0)) > np.pi:
             _warn(
-                f"{name}: points of the angle {model.x[i]} lie {widest:.3g} to either side of its "
+                f"points of the angle {model.x[i]} lie {widest:.3g} to either side of its "
                 f"mean, more than half a turn: "
                 "its variance is too large for these points; take linearised(model), or a smaller "
                 "prior variance",
@@ -319,66 +346,26 @@ def _lower_root(cov: Array) -> tuple[Array, Array]:
 def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights
     (q,))."""
+    rules = [rule(side.axes) for side in sides]
+    state, meter = (
+        side._replace(points=x, weights=w) for side, (x, w) in zip(sides, rules, strict=True)
+    )
     n, measurement = model.n, measurement_of(model.angles.y)
-    state, meter = [(side, *rule(side.axes)) for side in sides]
-
-    def propagate(
-        side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None
-    ):
-        """Mean of the function, its deviations from that at the points (0 exactly for what does not
-        vary), deviations of x, the root of cov with 1 for what is known, and the covariance that
-        noises without points add."""
-        root, known = _lower_root(cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n)))
-        dx = np.where(known[..., None, :], 0.0, points[:, :n]) @ transpose(root)
-        _warn_of_turns(name, model, dx)
-        x = mean[..., None, :] + dx
-        noise = side.mean + points[:, n:] @ side.root.T
-        values = side.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]), k)
-        values = np.broadcast_to(values, (*x.shape[:-1], side.size))
-        middle = values[..., np.argmin((points**2).sum(axis=1)), :]
-        off = difference(values, middle[..., None, :], side.angles)
-        shift = weights @ off
-        added = side.added(x, weights, k)
-        return on_circle(middle + shift, side.angles), off - shift[..., None, :], dx, root, added
-
-    def regressed(
-        side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None
-    ):
-        """Mean of the function, its slopes by x, and the covariance of what is not linear in x:
-        regressions on the points."""
-        value, deviation, dx, root, added = propagate(side, points, weights, mean, cov, k)
-        weighed = deviation * weights[:, None]
-        cross = transpose(weighed) @ points[:, :n]
-        # A sum over points that ought to cancel leaves some units of precision: as a gain a
-        # measurement in disguise.
-        variance = np.maximum((weighed * deviation).sum(axis=-2), 0.0)
-        cross = np.where(np.abs(cross) <= LOST * np.sqrt(variance)[..., None], 0.0, cross)
-        slopes = transpose(np.linalg.solve(transpose(root), transpose(cross)))
-        explained = dx @ transpose(slopes)
-        rest = deviation - explained  # no difference of nearly equal matrices
-        size = (np.abs(deviation) + np.abs(explained)).max(axis=-2, keepdims=True) + np.abs(value)[
-            ..., None, :
-        ]
-        rest = np.where(np.abs(rest) <= LOST * size, 0.0, rest)  # rounding is no noise of the meter
-        return value, slopes, _weighted(weights, rest) + added
 
     def at(k: int | None) -> Structure:
         def predict(z: Array, p: Array) -> Gaussian:
-            tau, deviation, *_, added = propagate(*state, z, p, k)
-            return Gaussian(tau, _weighted(state[2], deviation) + added)
+            tau, deviation, *_, added = state.propagated(z, p, k)
+            return Gaussian(tau, state.spread(deviation) + added)
 
         def measure(m: Array, d: Array) -> Measurement:
             d = np.broadcast_to(d, (*m.shape, n))
-            h, G, R = regressed(*meter, m, d, k)
+            h, G, R = meter.regressed(m, d, k)
             return measurement(h, G, symmetric(G @ d @ transpose(G)) + R, R)
 
         def transition(z: Array, p: Array) -> Transition:
-            return Transition(*regressed(*state, z, np.broadcast_to(p, (*z.shape, n)), k)[1:])
+            p = np.broadcast_to(p, (*z.shape, n))
+            return Transition(*state.regressed(z, p, k)[1:])
 
         return Structure(name, model, predict, measure, transition)
 
     return of_steps(name, model, at)
-
-
-def _weighted(weights: Array, deviation: Array) -> Array:
-    return symmetric(transpose(deviation * weights[:, None]) @ deviation)

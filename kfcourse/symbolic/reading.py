@@ -15,7 +15,7 @@ import sympy as sp
 
 from kfcourse.errors import ModelError
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.formula import check_name, parse
+from kfcourse.symbolic.formula import parse
 from kfcourse.symbolic.sense import is_covariance
 
 Formula: TypeAlias = str | sp.Expr
@@ -47,22 +47,11 @@ def table(what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
     return dict(given)
 
 
-def checked_name(name: str) -> str:
-    """The name, if a symbol may have it."""
-    try:
-        return check_name(name)
-    except ValueError as error:
-        raise ModelError(str(error)) from None
-
-
 def exact_number(what: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
+    kinds = int | float | np.integer | np.floating | sp.Rational
     try:
-        number = (
-            float(value)
-            if isinstance(value, int | float | np.integer | np.floating | sp.Rational)
-            else float("nan")
-        )
+        number = float(value) if isinstance(value, kinds) else float("nan")
     except OverflowError:
         number = float("inf")
     if isinstance(value, bool) or not np.isfinite(number):
@@ -80,11 +69,8 @@ def exact_matrix(array: Array) -> sp.ImmutableMatrix:
 
 def formula_list(what: str, formulas: Formulas) -> list[Formula]:
     """One formula or several as a list."""
-    if isinstance(formulas, str) or (
-        isinstance(formulas, sp.Expr) and not isinstance(formulas, sp.MatrixBase)
-    ):
-        return [formulas]
-    result = list(formulas) if isinstance(formulas, Sequence | sp.MatrixBase) else [formulas]
+    several = isinstance(formulas, Sequence | sp.MatrixBase) and not isinstance(formulas, str)
+    result = list(formulas) if several else [formulas]
     if not result:
         raise ModelError(f"`{what}` holds no formula")
     for formula in result:
@@ -140,14 +126,15 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
         raise ModelError(
             f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})"
         )
+    problem = ""
     if not (np.isfinite(mean).all() and np.isfinite(cov).all()):
-        raise ModelError(
-            f"`{what}`: mean and variance must be finite, got {mean} and {cov.tolist()}"
-        )
-    if not np.array_equal(cov, cov.T):
-        raise ModelError(f"`{what}`: the covariance matrix must be symmetric, got {cov.tolist()}")
-    if not is_covariance(cov):
-        raise ModelError(f"`{what}`: negative variance in {cov.tolist()}")
+        problem = "mean and variance must be finite"
+    elif not np.array_equal(cov, cov.T):
+        problem = "the covariance matrix must be symmetric"
+    elif not is_covariance(cov):
+        problem = "negative variance"
+    if problem:
+        raise ModelError(f"`{what}`: {problem}, got {mean} and {cov.tolist()}")
     return Gaussian(mean, cov)
 
 

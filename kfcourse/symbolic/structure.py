@@ -114,13 +114,8 @@ class Structure:
             for i, j in cartesian(range(matrix.rows), range(matrix.cols)):
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
-                index = (
-                    ""
-                    if len(matrix) == 1
-                    else f"_{{{i + 1}}}"
-                    if matrix.cols == 1
-                    else f"_{{{i + 1}{j + 1}}}"
-                )
+                entry = f"{i + 1}" if matrix.cols == 1 else f"{i + 1}{j + 1}"
+                index = "" if len(matrix) == 1 else f"_{{{entry}}}"
                 value = f"{FUNCTION_LATEX[name]}{index}({names})"
                 first, *further = formula_lines(matrix[i, j], arguments, value)
                 lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]

@@ -68,11 +68,11 @@ def _readable(expression: sp.Expr) -> sp.Expr:
     return min(ways, key=lambda way: len(sp.Add.make_args(way)))
 
 
-def _by_other(expression: sp.Expr, one: type[sp.Function], other: type[sp.Function]) -> sp.Expr:
+def _by_other(expression: sp.Expr, squared: type[sp.Function], other: type[sp.Function]) -> sp.Expr:
     """With 1 - other^2 for the square of one of both functions."""
     return sp.expand(
         expression.replace(
-            lambda e: e.is_Pow and e.exp == 2 and e.base.func is one,
+            lambda e: e.is_Pow and e.exp == 2 and e.base.func is squared,
             lambda e: 1 - other(*e.base.args) ** 2,
         )
     )

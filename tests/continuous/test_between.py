@@ -25,7 +25,7 @@ from kfcourse import (
 from kfcourse.cli import main
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
-from kfcourse.filters import aof, duof, fos, kalman_filter, particle, pointmass
+from kfcourse.filters import aof, duof, fos, kalman_filter, particle
 from kfcourse.lab import find_variant
 from kfcourse.lab.variants import VariantError, summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
@@ -578,7 +578,7 @@ def test_other_mistakes():
         sampled("x", "1", "x + w", substeps=0)
     with pytest.raises(NoClosedForm, match="tanh"):
         gaussian(benes())
-    for other in (pointmass, kalman_filter, lambda model: posterior_bound(model, 10, 3, 1)):
+    for other in (kalman_filter, lambda model: posterior_bound(model, 10, 3, 1)):
         with pytest.raises(ModelError, match="moves in continuous time between"):
             other(sampled("-x", "1", "x + w"))
 
@@ -591,11 +591,20 @@ def test_a_drift_that_explodes_is_named():
         run(aof(gaussian(model)), np.full(3, np.nan))
 
 
-def test_a_stiff_model_does_not_take_minutes(monkeypatch):
-    monkeypatch.setattr("kfcourse.continuous.integration.MOST_STEPS", 300)
-    model = sampled("-1e5*(x - sin(t)) - x**3", "1", "x + w", interval=5)
-    with pytest.raises(NotFinite, match="stiff: 300 steps reach"):
-        run(aof(linearised(model)), np.zeros(3))
+def test_stiff_equations_are_left_to_an_implicit_method():
+    """A fast component follows sin(t) at the distance (cos(t) + sin(t)^3) / c, with the variance
+    1 / (2 (c + 3 x^2)), but for 1 / c^2."""
+    c = 1e5
+    model = sampled("-1e5*(x - sin(t)) - x**3", "1", "x + w")
+    z, p = np.array([[0.5], [-1.0]]), np.array([[[0.2]], [[0.1]]])
+    tau, Theta = gaussian(model).at(0).predict(z, p)
+    slow = np.sin(1) - (np.cos(1) + np.sin(1) ** 3) / c
+    np.testing.assert_allclose(tau, np.full((2, 1), slow), rtol=0, atol=2e-8)
+    np.testing.assert_allclose(
+        Theta, np.full((2, 1, 1), 1 / (2 * c + 6 * np.sin(1) ** 2)), rtol=1e-4
+    )
+    with pytest.raises(NotFinite, match="stiff, and 100 trajectories"):
+        gaussian(model).at(0).predict(np.zeros((100, 1)), np.ones((1, 1)))
 
 
 def test_a_table_has_drift_and_diffusion(tmp_path):
@@ -649,4 +658,9 @@ def test_the_command_ranks_the_filters_of_such_a_variant(tmp_path, monkeypatch):
         main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"]
     )
     assert done.exit_code == 0 and "LAOF" in done.stdout and "No report" in done.stderr
+    assert "log score" not in done.stdout
+    command = ["lab", "mine", "--variants", "my.toml", "--runs", "128", "--steps", "2", "--scores"]
+    done = CliRunner().invoke(main, [*command, "--filters", "aof-exact,aof-linearised"])
+    scores = done.stdout.split("CRPS\n")[1].splitlines()
+    assert [line.split()[-1] == "-" for line in scores] == [True, False]  # its law is not normal
     assert Path("numbers.json").exists() and not Path("lab-mine").exists()

@@ -353,7 +353,7 @@ def test_a_jump_is_refused_with_the_reason_where_it_cannot_be_used(formula):
 
 
 def test_the_reason_is_told_in_the_formulas_of_the_model():
-    with pytest.raises(NoClosedForm, match=r"term 1/\(x\*\*2 \+ 1\) in 8\*cos\(6\*k/5\) \+ v"):
+    with pytest.raises(NoClosedForm, match=r"term 1/\(x\*\*2 \+ 1\) in .*8\*cos\(6\*k/5\)"):
         gaussian(growth())
 
 

@@ -26,6 +26,7 @@ from kfcourse.lab.quality import (
     examine_all,
     shares,
     table,
+    unmeasured,
 )
 from kfcourse.lab.short_names import LAB
 from kfcourse.lab.variants import STEPS, VariantError, read_variant
@@ -46,7 +47,17 @@ def variant(state, meter, parameters=None, **options):
 
 
 def compared(model, names, runs, seed, steps=STEPS):
-    return compare(lab_filters(model, names), model, runs, steps, seed, jobs=1, progress=False)
+    """A comparison that holds the estimate without measurements too."""
+    x = simulate(model, 20_000, steps, seed + 1000).x
+    return compare(
+        [*lab_filters(model, names), unmeasured(model, x)],
+        model,
+        runs,
+        steps,
+        seed,
+        jobs=1,
+        progress=False,
+    )
 
 
 # --- the shipped variants
@@ -225,8 +236,7 @@ def riccati(steps):
 
 
 def test_the_share_of_a_kalman_filter_is_that_of_the_riccati_equation():
-    x = simulate(LINEAR, 100_000, STEPS, 1).x
-    found = shares(compared(LINEAR, ["aof-gaussian"], 20_000, 1), "aof-gaussian", x)
+    found = shares(compared(LINEAR, ["aof-gaussian"], 20_000, 1), "aof-gaussian")
     assert abs(found.value[0] - riccati(STEPS)) < 4 * found.standard_error[0]
     assert found.standard_error[0] < 0.01 * found.value[0]  # so that the line above tells something
 
@@ -239,6 +249,19 @@ def test_a_share_that_is_not_known_well_is_not_enough():
     assert few.value < 0.9
     assert not few.ok
     assert many.ok
+
+
+def test_the_estimate_without_measurements_is_the_mean():
+    model = Model.define("0.5*x + 1 + v", "x + w", prior={"mean": 3, "variance": 2})
+    x = simulate(model, 40_000, 4, 1).x
+    one = unmeasured(model, x)
+    state = one.init(3)
+    mean, variance = 3.0, 2.0
+    for _ in range(4):
+        state = one.step(state, np.full((3, 1), 1e6))
+        assert abs(state.posterior.mean - mean).max() < 4 * np.sqrt(variance / 40_000)
+        assert abs(state.posterior.cov / variance - 1) < 4 * np.sqrt(2 / 40_000)
+        mean, variance = 0.5 * mean + 1, 0.25 * variance + 1
 
 
 # --- the filters differ

@@ -15,6 +15,7 @@ from kfcourse import (
     load_variants,
     simulate,
 )
+from kfcourse.continuous import moment_equations
 from kfcourse.filters import aof, logic_dynamic
 from kfcourse.lab.short_names import JumpStructures
 from kfcourse.lab.variants import VariantError, find_variant, read_variant, read_variants
@@ -22,6 +23,7 @@ from kfcourse.lab.variants import VariantError, find_variant, read_variant, read
 pytestmark = pytest.mark.quick
 
 TASKS = {name: find_variant(name) for name in ("D1", "D2", "D3", "J1", "J2", "J3", "J4")}
+BETWEEN = {name: find_variant(name) for name in ("C1", "C2", "C3", "CD1", "CD2", "CD3")}
 
 
 def law(model, seed, spread=0.1):
@@ -48,6 +50,75 @@ def test_each_is_a_variant_of_its_own_and_none_is_for_the_exercises():
 def test_each_stays_finite_for_as_long_as_the_lab_runs():
     for name, task in TASKS.items():
         assert np.isfinite(simulate(task.model, 20_000, task.steps, seed=1).x).all(), name
+
+
+def test_those_in_continuous_time_are_shipped_and_stay_finite():
+    assert set(BETWEEN) <= set(read_variants()[0]) and not set(BETWEEN) & set(load_variants())
+    ends = {
+        name: float(one.model.known.interval) * (one.steps - 1) for name, one in BETWEEN.items()
+    }
+    assert ends == {"C1": 20, "C2": 20, "C3": 100, "CD1": 20, "CD2": 20, "CD3": 100}
+    for name, task in BETWEEN.items():
+        x = simulate(task.model, 500, task.steps, seed=1).x
+        assert np.isfinite(x).all() and np.abs(x).max() < 130, name
+
+
+def test_their_moment_equations_are_those_of_the_note():
+    (m,), ((d,),) = law(BETWEEN["CD1"].model, 1)
+    z, p = m + 2, d + 0.5
+    for name, noise in (("CD1", 1), ("C1", 10)):
+        model = BETWEEN[name].model
+        equations = moment_equations(model)
+        at = {equations.z[0]: z, equations.p[0]: p} | model.values
+        rates = [float(part[0].subs(at)) for part in equations[2:]]
+        expected = [-0.5 * z - 0.01 * (z**3 + 3 * z * p), -0.5 - 0.03 * (z**2 + p), 2.25]
+        np.testing.assert_allclose(rates, expected, rtol=1e-12)
+        h, G, F, _ = gaussian(model).at(0).measure(np.array([z]), np.array([[p]]))
+        wanted = [z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + noise]
+        np.testing.assert_allclose([np.squeeze(one) for one in (h, G, F)], wanted, rtol=1e-12)
+    for name, noise in (("CD2", 1), ("C2", 10)):
+        model = BETWEEN[name].model
+        z, p = law(model, 2)
+        equations = moment_equations(model)
+        at = dict(zip([*equations.z, *equations.p], [*z, *p.ravel()], strict=True)) | model.values
+        drift, A, Theta = (np.array(part.subs(at), dtype=float) for part in equations[2:])
+        w2 = (0.1 * np.pi) ** 2
+        square = z[0] ** 2 * z[1] + z[1] * p[0, 0] + 2 * z[0] * p[0, 1]
+        np.testing.assert_allclose(drift[:, 0], [z[1], -w2 * z[0] + z[1] - 0.25 * square])
+        lower = [-w2 - 0.5 * (z[0] * z[1] + p[0, 1]), 1 - 0.25 * (z[0] ** 2 + p[0, 0])]
+        np.testing.assert_allclose(A, [[0, 1], lower], rtol=1e-12)
+        np.testing.assert_allclose(Theta, np.diag([0, z[0] ** 2 + p[0, 0]]), rtol=1e-12)
+        _, G, F, _ = gaussian(model).at(0).measure(z, p)
+        np.testing.assert_allclose(F - p, noise * np.eye(2), atol=1e-12)
+        np.testing.assert_array_equal(G, np.eye(2))  # in the source diag(1, 0)
+
+
+@pytest.mark.parametrize(("name", "noise"), [("CD3", (1e-4, 4e-14)), ("C3", (2e-4, 8e-10))])
+def test_the_landing_in_continuous_time(name, noise):
+    """Its meter's Jacobian has k0 in the column of the angle; before 45 s one of its seconds is
+    D3's step but for Euler's error."""
+    model = BETWEEN[name].model
+    m, d = law(model, 3)
+    speed, angle, height = m
+    E, kappa = 0.0433333 * speed**2 * np.exp(-0.09 * height), -0.3
+    rho = np.array([np.cos(angle) - kappa * np.sin(angle), np.sin(angle) + kappa * np.cos(angle)])
+    h, G, F, R = linearised(model).at(3).measure(m, d)
+    columns = np.column_stack(
+        [2 * E * rho / speed, E * np.array([-rho[1], rho[0]]), -0.09 * E * rho]
+    )
+    np.testing.assert_allclose(h, E * rho, rtol=1e-9)
+    np.testing.assert_allclose(G, columns, rtol=1e-9, atol=1e-18)
+    np.testing.assert_allclose(
+        R, np.diag(E**2 * rho**2 * noise[0] + noise[1]), rtol=1e-9, atol=1e-30
+    )
+    np.testing.assert_allclose(F, G @ d @ G.T + R, rtol=1e-9)
+    second = 1 if name == "CD3" else 2
+    x = simulate(model, 3, 40 * second, seed=2).x[::second]
+    step = linearised(TASKS["D3"].model)
+    for k in (5, 30):
+        euler = step.at(k).predict(x[k], np.zeros((3, 3))).mean
+        np.testing.assert_allclose(x[k + 1], euler, atol=0.02)
+        assert np.abs(x[k + 1] - euler).max() > 1e-4
 
 
 def test_d1_has_the_structural_functions_of_the_note():

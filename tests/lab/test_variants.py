@@ -174,9 +174,8 @@ BAD_VARIANTS = {
     "negative variance": (GOOD + "prior = { variance = -1.0 }", "negative variance"),
     "a product beyond the floats": (
         'state = "a*a*a*a*a*x + v"\nmeter = "x + w"\nparameters = { a = 1e99 }',
-        "the state equation a**5*x + v holds the number 1.00e+495 with these parameters",
+        "the state equation, a**5*x + v, with these parameters: it holds the number 1.00e+495",
     ),
-    "an exponential beyond the floats": ('state = "x + exp(400)*v"\nmeter = "x + w"', "5.22e+173"),
     "the end in a comment": ('state = "0.9*x # + v"\nmeter = "x + w"', "number sign"),
     "no noise": ('state = "0.9*x"\nmeter = "x"', "no noise enters the state equation"),
     "a state known exactly": (

@@ -333,7 +333,7 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
         ),
         (
             {"observations": [GOOD._replace(tag=-0.5)]},
-            "captured at t = -0.5 s, before the prior's 0 s",
+            "captured at t = -0.5 s, before the prior, at 0",
         ),
         (
             {"observations": [GOOD._replace(value=np.zeros((3, 2)))]},
@@ -346,12 +346,12 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
         ),
         ({"observations": [GOOD], "depth": 0.08}, "remembers only 0.08 s; give depth=0.1 or more"),
         ({"times": [2.0, 1.0]}, "ascending"),
-        ({"times": [0.5], "start": 1.0}, "wanted at t = 0.5 s, before the prior's 1 s"),
+        ({"times": [-0.5]}, "from the prior's, 0, on"),
         ({"by": "tags"}, 'by "tag" or by "arrival", not by \'tags\''),
         ({"sensors": [two_sensors()[0]] * 2}, "a name of its own"),
         (
             {"prior": Gaussian(np.zeros(3), np.eye(3))},
-            "prior's mean must have the shape (2,) or (1, 2), got (3,)",
+            "prior's mean must have the shape (2,) or (1, 2), its covariance",
         ),
         (
             {"sensors": [Sensor.define("short", ["s"], "s + w", 1.0)]},

@@ -72,7 +72,7 @@ def test_replaced_parameters_are_checked_as_those_defined():
     for equation, change in (("meter", {"r": -1}), ("state", {"c": 0})):
         with pytest.raises(
             ModelError,
-            match=f"the {equation} equation .* has no finite real value with these parameters",
+            match=f"the {equation} equation, .* with these parameters: no finite real value",
         ):
             model.replace(**change)
 
@@ -101,7 +101,7 @@ def test_numbers_of_every_library_are_read_as_typed(number):
         ({"parameters": {"__class__": 1}}, "cannot name"),
         ({"symbols": {"u": ["u"]}}, "keys x, v, w"),
         ({"symbols": {"x": ["x", "q"]}}, "1 state equation"),
-        ({"symbols": {"x": []}}, "1 state equation"),
+        ({"symbols": {"x": []}}, "x must be a name or a list of names"),
         ({"prior": {"cov": 1}}, "keys mean and variance"),
         ({"prior": {"variance": -1}}, "negative variance"),
         ({"prior": {"variance": [1, 2]}}, "lists of 1 numbers"),

@@ -43,17 +43,15 @@ def test_products_of_a_random_root_are_covariances():
 @pytest.mark.parametrize(
     ("state", "meter", "parameters", "place"),
     [
-        ("a*a*x + v", "x + w", {"a": 1e60}, "state"),
-        ("x + v", "x + a*a*w", {"a": 1e-60}, "meter"),
-        ("x + exp(a)*exp(a)*v", "x + w", {"a": 300}, "state"),
-        ("x + v*exp(a)", "x + w", {"a": 1e60}, "state"),
+        ("a*a*a*a*x + v", "x + w", {"a": 1e90}, "state"),
+        ("x + v", "x + a*a*a*a*w", {"a": 1e-90}, "meter"),
         ("x + v*log(a)", "x + w", {"a": -1}, "state"),
         ("x + v", "sqrt(a)*x + w", {"a": -1}, "meter"),
         ("x + v/(a - 1)", "x + w", {"a": 1}, "state"),
     ],
 )
 def test_numbers_out_of_all_sizes_are_refused_with_their_place(state, meter, parameters, place):
-    with pytest.raises(ModelError, match=f"the {place} equation .* with these parameters"):
+    with pytest.raises(ModelError, match=f"the {place} equation, .* with these parameters: "):
         Model.define(state, meter, parameters)
 
 
@@ -63,7 +61,7 @@ def test_a_parameter_s_exact_value_has_a_size_too():
 
 
 @pytest.mark.parametrize(
-    ("state", "parameters"), [("1e99*1e99*x + v", {}), ("cosh(a**16) + v", {"a": 1e99})]
+    ("state", "parameters"), [("1e99*1e99*1e99*1e99*x + v", {}), ("cosh(a**16) + v", {"a": 1e99})]
 )
 def test_a_long_formula_or_number_is_shown_shortened(state, parameters):
     with pytest.raises(ModelError) as caught:
@@ -74,7 +72,7 @@ def test_a_long_formula_or_number_is_shown_shortened(state, parameters):
 def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
     """Each number is within its limits, their product in the moments is not: generated code would
     hold the name `inf`."""
-    with pytest.raises(ModelError, match=r"derived functions hold the number .*e"):
+    with pytest.raises(ModelError, match=r"predict: it holds the number .*e"):
         gaussian(Model.define("(1e90*x + v)**4", "x + w"))
 
 

@@ -140,11 +140,13 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
     if not FINEST <= accuracy < 1:
         raise ModelError(f"the exact filter needs {FINEST:g} <= accuracy < 1, got {accuracy}")
     modes = modes_of(model)
+    if modes[0].between is not None:
+        return modes[0].between.exact(model, accuracy)
     if len(modes) > 1 and model.angles.x:
         raise ModelError(
             "the exact filter over modes holds no state that is an angle; use particle(model)"
         )
-    exact = _Exact(model, printed(model), accuracy)
+    exact = Exact(model, printed(model), accuracy)
     back = exact.look_back if len(modes) == 1 else None
     return Filter("aof-exact", modes[0], exact.init, exact.step, evidence=_evidence, look_back=back)
 
@@ -154,7 +156,7 @@ def _evidence(before: State, y: Array, after: State) -> Array:
 
 
 @dataclass(frozen=True)
-class _Exact:
+class Exact:
     """The exact filter of a model, which is printed as the function `text`."""
 
     model: Model | JumpModel
@@ -281,7 +283,8 @@ class _Exact:
         reason = REASONS[statuses[0] or len(REASONS) - 1] if len(statuses) else REASONS[0]
         raise Unresolved(
             f"{where} of {self.model}, run {run}: {reason}; look at the measurement, or leave the "
-            f"exact filter out"
+            f"exact filter out",
+            reason=reason,
         )
 
 

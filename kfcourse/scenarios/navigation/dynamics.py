@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from kfcourse.errors import expect_not_negative
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
+from kfcourse.symbolic.sense import is_covariance
 
 # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to
 # 1e-11 s
@@ -87,9 +88,7 @@ class Dynamics:
             if not np.isfinite(matrix).all():
                 raise ValueError(f"{name} must be finite, got {matrix.tolist()}")
             object.__setattr__(self, name, matrix)
-        values = np.linalg.eigvalsh(symmetric(Qc))
-        # rounding of eigvalsh
-        if not np.array_equal(Qc, Qc.T) or values.min() < -1e-12 * max(values.max(), 0.0):
+        if not (np.array_equal(Qc, Qc.T) and is_covariance(Qc)):
             raise ValueError(
                 f"Qc is an intensity of noise: symmetric and not negative; got {Qc.tolist()}"
             )

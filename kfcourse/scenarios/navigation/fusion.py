@@ -85,7 +85,6 @@ def fuse(
     inputs: Inputs | None = None,
     by: str = "tag",
     depth: float | None = None,
-    start: float = 0.0,
 ) -> Gaussian:
     """Estimates from several sensors, each at its own rate, delay and time scale.
 
@@ -96,7 +95,7 @@ def fuse(
         As the filter believes them to be: their meters, and clocks that turn tags into the filter's
         time.
     prior : Gaussian
-        Law of the state at `start`: mean (n,) or (runs, n), covariance (n, n) or (runs, n, n).
+        Law of the state at t = 0: mean (n,) or (runs, n), covariance (n, n) or (runs, n, n).
     observations : sequence of Observation
         In any order.
     times : ndarray (s,)
@@ -108,8 +107,6 @@ def fuse(
         "arrival" ignores the tags, as if every measurement were captured when it arrives.
     depth : float, optional
         How many seconds back the filter remembers; by default as many as these observations need.
-    start : float
-        Time of the prior.
 
     Returns
     -------
@@ -119,13 +116,11 @@ def fuse(
     Raises
     ------
     ValueError
-        Sensors not known or of another state, moments not finite, before `start`, or after the
+        Sensors not known or of another state, moments not finite, before 0, or after the
         arrival; a measurement older than `depth`; a prior with a negative variance; shapes that do
         not fit.
     """
-    return _run(
-        dynamics, sensors, prior, observations, times, inputs, by, depth, start, lambda past: None
-    )
+    return _run(dynamics, sensors, prior, observations, times, inputs, by, depth, lambda past: None)
 
 
 def follow(
@@ -137,7 +132,6 @@ def follow(
     *,
     inputs: Inputs | None = None,
     by: str = "tag",
-    start: float = 0.0,
 ) -> Followed:
     """As `fuse`, with the innovations: each as it was when all measurements captured before it had
     come.
@@ -153,7 +147,7 @@ def follow(
             of = past.event.sensor.name, past.event.time
             innovations.append(Innovation(*of, innovation, F.reshape(-1, *F.shape[-2:])))
 
-    laws = _run(dynamics, sensors, prior, observations, times, inputs, by, None, start, keep)
+    laws = _run(dynamics, sensors, prior, observations, times, inputs, by, None, keep)
     return Followed(laws, innovations)
 
 
@@ -166,7 +160,6 @@ def _run(
     inputs: Inputs | None,
     by: str,
     depth: float | None,
-    start: float,
     keep: Callable[[Past], None],
 ) -> Gaussian:
     """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of
@@ -180,14 +173,12 @@ def _run(
                 f"motion has {n}: "
                 "Sensor.define takes the names of all, in the order of the motion"
             )
-    moments = _checked_times(times, start)
+    moments = _checked_times(times)
     stamps = [stamp for message in observations for stamp in (message.tag, message.arrival)]
-    slack = rounding(moments, *stamps, start)
-    events = sorted(
-        _events(sensors, observations, by, start, slack), key=lambda event: event.arrival
-    )
+    slack = rounding(moments, *stamps)
+    events = sorted(_events(sensors, observations, by, slack), key=lambda event: event.arrival)
     depth = _checked_depth(events, depth, slack)
-    history = [Past(start, None, _checked_prior(prior, n, events, inputs))]
+    history = [Past(0.0, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
     for now in moments:
         arrived = events[
@@ -230,7 +221,6 @@ def _events(
     sensors: Sequence[Sensor],
     observations: Sequence[Observation],
     by: str,
-    start: float,
     slack: float,
 ) -> list[Event]:
     if by not in ("tag", "arrival"):
@@ -259,12 +249,11 @@ def _events(
                 f"the filter's clock for this sensor, {sensor.clock}, must be wrong: Clock.fit "
                 f"finds it from interrupts"
             )
-        if time < start - slack:
+        if time < -slack:
             raise ValueError(
-                f"{name}: captured at t = {time:.16g} s, before the prior's {start:.16g} s; leave "
-                f"it out, or start earlier"
+                f"{name}: captured at t = {time:.16g} s, before the prior, at 0; leave it out"
             )
-        events.append(Event(max(time, start), arrival, sensor, np.asarray(value, dtype=float)))
+        events.append(Event(max(time, 0.0), arrival, sensor, np.asarray(value, dtype=float)))
     return events
 
 
@@ -284,15 +273,14 @@ def _checked_depth(events: Sequence[Event], depth: float | None, slack: float) -
     return needed if depth is None else depth
 
 
-def _checked_times(times: Array, start: float) -> list[float]:
+def _checked_times(times: Array) -> list[float]:
     moments = np.asarray(times, dtype=float)
-    if not len(moments) or not np.isfinite(moments).all() or (np.diff(moments) < 0).any():
-        raise ValueError("times of estimates must be a finite ascending vector")
-    if moments[0] < start:
-        raise ValueError(
-            f"an estimate is wanted at t = {moments[0]:.16g} s, before the prior's {start:.16g} "
-            f"s; start earlier"
-        )
+    if (
+        not len(moments)
+        or not np.isfinite(moments).all()
+        or (np.diff(moments, prepend=0.0) < 0).any()
+    ):
+        raise ValueError("times of estimates must be finite and ascending, from the prior's, 0, on")
     return moments.tolist()
 
 

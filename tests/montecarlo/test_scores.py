@@ -1,0 +1,138 @@
+"""Scores of predictions: a slow loop, closed forms of a linear model, and that honesty pays."""
+
+import numpy as np
+import pytest
+import scipy
+
+from kfcourse import Model, compare, gaussian, linearised
+from kfcourse.filters import aof, duof, imm, kalman_filter, pointmass
+from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.experiment import Sample, batch_sizes, states
+from kfcourse.montecarlo.scores import crps_of_normal
+from kfcourse.symbolic.jumping import JumpModel
+
+pytestmark = pytest.mark.quick
+
+
+def linear(**changes):
+    settings = {"prior": {"mean": 0.5, "variance": 2}, "meter_noise": {"variance": 0.3}} | changes
+    return Model.define("0.9*x + 0.6*v", "1.5*x + w", **settings)
+
+
+def by_quadrature(y, mean, deviation):
+    """Integral of (P - [. >= y])^2."""
+    law = scipy.stats.norm(mean, deviation)
+    below = scipy.integrate.quad(lambda u: law.cdf(u) ** 2, -np.inf, y)[0]
+    return below + scipy.integrate.quad(lambda u: law.sf(u) ** 2, y, np.inf)[0]
+
+
+def test_crps_is_the_integral():
+    for y, mean, deviation in ((0.3, 0.0, 1.0), (-4.0, 1.0, 0.5), (2.0, 2.0, 3.0)):
+        ours = crps_of_normal(np.array([y - mean]), np.array([deviation]))
+        assert ours.item() == pytest.approx(by_quadrature(y, mean, deviation), rel=1e-7)
+    sure = crps_of_normal(np.array([-1.5, 0.0]), np.zeros(2))
+    np.testing.assert_array_equal(sure, [1.5, 0.0])
+
+
+def test_a_slow_loop():
+    """Two meters, correlated; a designed filter, whose F is that of the structure given."""
+    model = Model.define(
+        "0.9*x + 0.1*x**2 + 0.3*v",
+        ["x + w1", "x**2 + w2"],
+        prior={"mean": 0.4, "variance": 0},
+        meter_noise={"variance": [[0.3, 0.1], [0.1, 0.2]]},
+    )
+    normal, tangent = gaussian(model), linearised(model)
+    filters = [aof(tangent), duof(model)]
+    compared = compare(filters, model, 66, 2, seed=4, scores=normal, same_ensemble=True)
+    seeds = np.random.SeedSequence(4).spawn(65)[1:]
+    y = np.stack([one.y for one in Sample(model, 2, batch_sizes(66), seeds).instants()])
+    law = scipy.stats.multivariate_normal
+    wanted = []
+    for k, state in enumerate(states(filters[0], y)[:-1]):
+        logs, crps = [], []
+        for run in range(66):
+            of_run = Gaussian(
+                state.predicted.mean[[run]],
+                np.broadcast_to(state.predicted.cov, (66, 1, 1))[[run]],
+            )
+            h, _, F, _ = tangent.at(k).measure(*of_run)
+            logs.append(law(h[0], F[0]).logpdf(y[k, run]))
+            crps.append(
+                sum(by_quadrature(y[k, run, i], h[0, i], np.sqrt(F[0, i, i])) for i in (0, 1))
+            )
+        wanted.append((np.mean(logs), np.mean(crps)))
+    ours = compared.log_score("aof-linearised"), compared.crps("aof-linearised")
+    np.testing.assert_allclose([one.value for one in ours], np.transpose(wanted), rtol=1e-6)
+    # the first prediction is the same for all: the prior, by the Gaussian functions
+    h, _, F, _ = normal.at(0).measure(*model.prior)
+    assert compared.log_score("duof").value[0] == pytest.approx(law(h, F).logpdf(y[0]).mean())
+    more = compared.log_score("duof", minus="aof-linearised")
+    assert more.value == pytest.approx(compared.log_score("duof").value - ours[0].value)
+    whole = compared.crps("duof", steps=slice(1, None))
+    assert whole.value == pytest.approx(compared.crps("duof").value[1:].mean())
+
+
+def expected_scores(model, steps):
+    """-ln sqrt(2 pi e F), and sqrt(F / pi): what a filter that is right has."""
+    filter_ = kalman_filter(model)
+    F = [
+        linearised(model).at(k).measure(*state.predicted).F.item()
+        for k, state in enumerate(states(filter_, np.zeros((steps, 1, 1)))[:-1])
+    ]
+    return -0.5 * np.log(2 * np.pi * np.e * np.array(F)), np.sqrt(np.array(F) / np.pi)
+
+
+def test_the_scores_of_kalmans_filter_and_their_intervals():
+    model, steps = linear(), 6
+    wanted = expected_scores(model, steps)
+    inside = np.zeros((2, steps))
+    for seed in range(40):
+        compared = compare(
+            [kalman_filter(model)], model, 400, steps, seed, scores=linearised(model)
+        )
+        for i, score in enumerate((compared.log_score("kalman"), compared.crps("kalman"))):
+            low, high = score.interval()
+            inside[i] += (low <= wanted[i]) & (wanted[i] <= high)
+    # 240 intervals of 95 % each, six of a seed together: fewer than 212 in one case of thousands
+    assert (inside.sum(axis=1) >= 0.88 * 40 * steps).all() and inside.sum() < 480
+
+
+def test_who_is_wrong_about_its_doubt_loses():
+    model = linear()
+    sure = linear(meter_noise={"variance": 0.1})
+    filters = [kalman_filter(model), aof(linearised(sure))]
+    compared = compare(filters, model, 2000, 5, seed=2, scores=linearised(model))
+    for score, sign in ((compared.log_score, 1), (compared.crps, -1)):
+        more = score("kalman", minus="aof-linearised", steps=slice(1, None))
+        assert sign * more.value > 4 * more.standard_error
+
+
+def test_the_exact_filter_has_the_most():
+    model = Model.define("0.9*x + 0.5*v", "x + 0.4*x**2 + 0.5*w")
+    filters = [pointmass(model), aof(gaussian(model))]
+    compared = compare(filters, model, 1000, 4, seed=3, scores=gaussian(model))
+    more = compared.log_score("aof-exact", minus="aof-gaussian", steps=slice(None))
+    assert more.value > 4 * more.standard_error
+    assert np.isnan(compared.crps("aof-exact").value).all()
+
+
+def test_modes_are_judged_by_their_mixture():
+    model = JumpModel.define(
+        "0.9*x + 0.6*v",
+        "1.5*x + g*w",
+        {"g": 0.5},
+        modes={"good": {}, "bad": {"parameters": {"g": 6}}},
+        transition=[0.8, 0.2],
+    )
+    structures = [linearised(mode) for mode in model.modes]
+    filters = [imm(structures, model, model.first), aof(structures[0])]
+    compared = compare(filters, model, 1000, 4, seed=3, scores=structures[0])
+    more = compared.log_score("imm", minus="aof-linearised", steps=slice(None))
+    assert more.value > 4 * more.standard_error
+
+
+def test_not_asked_for():
+    compared = compare([kalman_filter(linear())], linear(), 64, 2, seed=1)
+    with pytest.raises(KeyError, match="scores="):
+        compared.log_score("kalman")
