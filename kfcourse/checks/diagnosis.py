@@ -68,23 +68,28 @@ class Wrong:
             for place in range(len(parts))
             if place not in right
         ]
-        # a known mistake, or the first hint
-        lead = max(found, key=lambda one: (self._known(one[1]), bool(one[2])))
-        _, names, hint = lead
-        if not hint:
-            return start + GENERAL, names, False
-        same = [part for part, _, other in found if other == hint]
-        rest = [part for part, _, other in found if other != hint]
-        first = found[0][0]
-        explained = _tells(names)
-        says = f"{', '.join(same)}: {hint}"
-        if first not in rest:
-            says += f" {', '.join(rest)} may be wrong for the same reason." if rest else ""
-        elif self._known(names):  # its formula may be right, on a wrong result
-            says += f" Or: it follows from {first}. {first} may be wrong for the same reason."
-        else:  # what there is a hint of may follow from it
-            says, explained = f"{first} is wrong too: start there. {says}", False
-        return start + says, names, explained
+        known = [one for one in found if self._known(one[1])]
+        leads = known or [one for one in found if one[2]][:1]
+        if not leads:
+            return start + GENERAL, [], False
+        names = list(dict.fromkeys(name for _, seen, _ in leads for name in seen))
+        first, of_first, _ = found[0]
+        hints: dict[str, list[str]] = {}
+        rest = []
+        for part, seen, hint in found:
+            if all(hint != lead for *_, lead in leads):
+                rest.append(part)
+                continue
+            # its formula may be right, on a wrong result
+            follows = bool(known) and not set(seen) & set(of_first)
+            hint += f" Or: it follows from {first}." * follows
+            hints.setdefault(hint, []).append(part)
+        says = " ".join(f"{', '.join(where)}: {hint}" for hint, where in hints.items())
+        if first in rest and not known:  # what there is a hint of may follow from it
+            return f"{start}{first} is wrong too: start there. {says}", names, False
+        if rest:
+            says += f" {', '.join(rest)} may be wrong for the same reason."
+        return start + says, names, _tells(names)
 
     def _known(self, names: Sequence[str]) -> bool:
         return any(mistake.name in names for mistake, _ in self.known)
