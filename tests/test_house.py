@@ -192,7 +192,7 @@ ROOMS = {
     "book": 50_380,
     "exercises": 41_750,
     "kfcourse/*.py": 6_610,
-    "kfcourse/checks": 19_930,
+    "kfcourse/checks": 20_000,
     "kfcourse/continuous": 10_310,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_860,
