@@ -664,6 +664,14 @@ def test_search_finds_sections_and_quotes_them(window, words, page, section):
     assert problems == []
 
 
+def test_the_address_of_a_chapter_that_another_has_taken_in(window):
+    """It leads on, to the same section."""
+    tab, _ = window
+    tab.goto(f"{(HTML / 'derive-it.html').as_uri()}#derive-it")
+    tab.wait_for_url("**/live-lab.html#derive-it")
+    assert tab.locator("#derive-it h2").count() == 1
+
+
 def test_an_address_that_does_not_exist(window):
     tab, _ = window
     tab.goto((HTML / "404.html").as_uri())

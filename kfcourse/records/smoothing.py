@@ -96,8 +96,7 @@ def smoothing_error(filter_: Filter, y: Array, lag: int | None = None) -> Array:
     miss the same states: there it is a third too small.  Of two clouds it has one degree of
     freedom: an interval of 95 % reaches 12.7 standard errors (Student), not 2.  Over 400
     trajectories of each kind, 400 particles, such intervals held the exact smoother's components in
-    .95 of the cases, and in .91 where fewer than 20 particles counted; the page "Particles"
-    measures it anew, and why there are not four.  Arguments as of `smooth`.
+    .95 of the cases, and in .91 where fewer than 20 particles counted.  Arguments as of `smooth`.
 
     Raises
     ------
