@@ -193,8 +193,9 @@ def sampled(
     Examples
     --------
     >>> from kfcourse.continuous import sampled
-    >>> model = sampled("-a*x", "s*x", "x + w", dict(a=0.5, s=1), instants=[0, 0.3, 1.7],
-    stratonovich=True)
+    >>> model = sampled(
+    ...     "-a*x", "s*x", "x + w", dict(a=0.5, s=1), instants=[0, 0.3, 1.7], stratonovich=True
+    ... )
     >>> model
     Model(dx/dt = -a*x + s**2*x/2 + s*v*x, y = w + x; a = 1/2, s = 1; inputs t (3 values))
     >>> model.between.correction[0]

@@ -110,8 +110,9 @@ def gated(
     >>> from kfcourse import Model, run
     >>> from kfcourse.filters import gated, kalman_filter
     >>> one = kalman_filter(Model.define("x + 0.1*v", "x + w"))
-    >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one,
-    gated(one))] [23.247, 0.033]
+    >>> y = np.array([0.1, 0.0, 90.0])
+    >>> [round(run(each, y).mean[-1].item(), 3) for each in (one, gated(one))]
+    [23.247, 0.033]
     """
     expect(one, Filter, "gated")
     if structure is not None:

@@ -66,8 +66,9 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
     --------
     >>> from kfcourse import Model
     >>> from kfcourse.montecarlo.cramer_rao import posterior_bound
-    >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2,
-    seed=1).value.ravel().round(4).tolist() [0.8, 1.1671]
+    >>> model = Model.define("0.9*x + v", "x + 2*w")
+    >>> posterior_bound(model, runs=10, steps=2, seed=1).value.ravel().round(4).tolist()
+    [0.8, 1.1671]
     """
     expect(model, Model, "posterior_bound")
     try:

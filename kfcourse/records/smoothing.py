@@ -78,8 +78,9 @@ def smooth(filter_: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> from kfcourse import Model, linearised, smooth
     >>> from kfcourse.filters import aof
     >>> walk = Model.define("x + v", "x + w")
-    >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan,
-    4.0])).mean.ravel().tolist()] [0.944, 1.833, 2.556, 3.278]
+    >>> past = smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0]))
+    >>> [round(z, 3) for z in past.mean.ravel().tolist()]
+    [0.944, 1.833, 2.556, 3.278]
     """
     expect(filter_, Filter, "smooth")
     return stacked([state.posterior for state in _looked_back(filter_, y, lag)])

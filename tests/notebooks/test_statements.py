@@ -28,6 +28,7 @@ ANSWERED = {
     "o": 1,
     "p": 1,
     "r": 1,
+    "s": 0,
 }  # questions in words
 SAID = re.compile(
     r"\*(What to expect|Why never negative|When is there an answer\?|What is left out)\.?\*|It "

@@ -79,7 +79,7 @@ def test_a_changed_sign_stops_the_chapter(chapter: str, monkeypatch: pytest.Monk
         "the line to be changed has gone, or is there twice: choose another"
     )
     monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
-    with pytest.raises(Unverified):
+    with pytest.raises((Unverified, AssertionError)):
         gate.run(text.replace(right, wrong), wrong, chapter in ALONE)
 
 

@@ -166,8 +166,9 @@ class Sensor:
         Examples
         --------
         >>> from kfcourse.scenarios.navigation import Sensor
-        >>> Sensor.define("range", ["s", "h", "V"], "sqrt(s**2 + h**2) + w", variance=100.0,
-        period=0.25).model.p 1
+        >>> meter = "sqrt(s**2 + h**2) + w"
+        >>> Sensor.define("range", ["s", "h", "V"], meter, variance=100.0, period=0.25).model.p
+        1
         """
         model = Model.define(
             list(states),
