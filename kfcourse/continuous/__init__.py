@@ -13,7 +13,7 @@ dt over step k, with the noise variance N / (2 T).  A continuous filter is there
 `Filter` of this y_k, made for one step T; it tends to its differential equations as T -> 0.
 
 model        `ContinuousModel`, and `to_discrete`: the discrete model with the same limit
-paths        `simulate`, `coarsen`
+paths        `simulate`
 equations    `log_likelihood_rate`, `filter_equations`: the filter's formulas, derived
 bucy         `extended_kalman_bucy`: the filter
 stationary   `steady_state` of a linear model
@@ -38,7 +38,7 @@ from kfcourse.continuous.equations import (
 )
 from kfcourse.continuous.integration import MomentEquations, moment_equations
 from kfcourse.continuous.model import ContinuousModel, to_discrete
-from kfcourse.continuous.paths import Path, coarsen, simulate
+from kfcourse.continuous.paths import Path, simulate
 from kfcourse.continuous.sampling import sampled
 from kfcourse.continuous.stationary import Linear, Steady, linear_matrices, steady_state
 
@@ -50,7 +50,6 @@ __all__ = [
     "Path",
     "Steady",
     "benes_filter",
-    "coarsen",
     "extended_kalman_bucy",
     "filter_equations",
     "linear_matrices",

@@ -35,10 +35,11 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments
 from kfcourse.symbolic.structure import Structure, gaussian, gaussian_symbols, linearised
 
-MOST_STEPS = 2_000  # between two measurements, beyond which the equations are stiff
-FEW = (
-    64  # trajectories that may be stiff: the implicit method takes some hundredths of a second each
-)
+# trajectories that may be stiff: the implicit method takes some hundredths of a second each
+FEW = 64
+# between two measurements: of few trajectories, for which the implicit method is then faster; of
+# many, some seconds
+STEPS, MOST_STEPS = 2_000, 10_000
 NEAR = 1e-3  # of a mean that has no variance: a part of it stands for the standard deviation
 
 # (known, z, p) -> M[a], A, M[B B^T]
@@ -230,10 +231,10 @@ def _integrated(
         )
         return float(max((np.abs(mean) / sd).max(), of_F.max(), of_Q.max()))
 
-    start = packed(z, np.eye(n), np.zeros((n, n)))
-    done = _run(rate, error, start, span, accuracy)
+    start, few = packed(z, np.eye(n), np.zeros((n, n))), z.size <= FEW * n
+    done = _run(rate, error, start, span, accuracy, STEPS if few else MOST_STEPS)
     if done is None and z.size > n:  # stiff
-        if z.size > FEW * n:
+        if not few:
             raise NotFinite(
                 f"the moment equations are stiff, and {z.size // n} trajectories would take "
                 f"minutes: run at most {FEW}, or replace the fastest component by its steady state"
@@ -274,9 +275,10 @@ def _run(
     state: Array,
     span: float,
     accuracy: float,
+    most: int,
 ) -> Array | None:
-    """The state after the span, by steps whose error stays below the accuracy; None if they are too
-    many."""
+    """The state after the span, by steps whose error stays below the accuracy; None if they are
+    more than `most`."""
     s, h, slopes = 0.0, span, np.empty((7, state.size))
 
     def moved(weights: Array) -> Array:
@@ -284,7 +286,7 @@ def _run(
 
     with np.errstate(all="ignore"):  # a step that leaves the finite numbers is taken again, shorter
         slopes[0] = rate(s, state).ravel()
-        for _ in range(MOST_STEPS):
+        for _ in range(most):
             for i in range(1, 6):
                 slopes[i] = rate(s + RK45.C[i] * h, state + moved(RK45.A[i, :i])).ravel()
             ahead = state + moved(RK45.B)

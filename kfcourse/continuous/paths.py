@@ -1,4 +1,4 @@
-"""Trajectories of a continuous model, simulated and seen with a longer step."""
+"""Trajectories of a continuous model, simulated."""
 
 from __future__ import annotations
 
@@ -77,23 +77,3 @@ def simulate(
                     f"model, or use more substeps"
                 )
     return Path(step, x, y)
-
-
-def coarsen(path: Path, factor: int) -> Path:
-    """The same trajectories seen with a step `factor` times as long: every factor-th state, means
-    of the measurements."""
-    steps = len(path.y)
-    if (
-        isinstance(factor, bool)
-        or not isinstance(factor, int | np.integer)
-        or factor < 1
-        or steps % factor
-    ):
-        raise ValueError(
-            f"the factor must be a whole number that divides the {steps} steps, got {factor!r}"
-        )
-    return Path(
-        path.step * factor,
-        path.x[::factor],
-        path.y.reshape(steps // factor, factor, *path.y.shape[1:]).mean(axis=1),
-    )

@@ -39,11 +39,10 @@ def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> 
         omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: of x - lambda on omega
         alpha = a(z, m_v),            lambda' = F alpha + g          F, g: of x' on alpha
 
-    with the coefficients of two regressions over the ensemble.
-
-        Its own covariance is the residual of each regression, (n, n): one for the whole ensemble,
-        whether y came or not.  A measurement of which a component is missing corrects nothing: H is
-        that of whole ones.  Given `equations` take the place of a(z, m_v) and b(lambda, m_w).
+    with the coefficients of two regressions over the ensemble.  Its own covariance is the residual
+    of each regression, (n, n): one for the whole ensemble, whether y came or not.  A measurement of
+    which a component is missing corrects nothing: H is that of whole ones.  Given `equations` take
+    the place of a(z, m_v) and b(lambda, m_w).
     """
     expect(model, Model, "duof")
     (a, b), angles = equations or compile_noiseless(model), model.angles

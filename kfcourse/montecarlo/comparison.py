@@ -326,9 +326,8 @@ class Comparison:
         """M[ln p(y_k | y_0, ..., y_{k-1})] by the filter's prediction per step, (steps,): the more
         the better, and the exact filter has the most.
 
-        With `minus` what it has more than another filter, paired; with `steps` the mean over them,
-        one number.  A filter that is sure and wrong
-        loses without limit.
+        With `minus` the difference from another filter, paired; with `steps` the mean over them,
+        one number.  A filter that is sure and wrong loses without limit.
 
         Of a linear model, whose scores are known in closed form, the 95 % intervals of 2,000
         trajectories hold them in 94.6 % of the cases, those of `crps` in 94.7 % (300 seeds, 12
