@@ -201,10 +201,10 @@ ROOMS = {
     "kfcourse/montecarlo": 11_060,
     "kfcourse/notebooks": 26_810,
     "kfcourse/pages": 10_140,
-    "kfcourse/records": 6_250,
-    "kfcourse/scenarios": 11_580,
+    "kfcourse/records": 6_320,
+    "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 24_270,
-    "tests": 229_450,
+    "tests": 229_460,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

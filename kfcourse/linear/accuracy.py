@@ -51,8 +51,8 @@ def covariances(
     given = None if gains is None else np.broadcast_to(gains, (steps, n, p))
     rows = []
     for k in range(steps):
-        optimal = gain(cov @ system.H.T, system.measure(np.zeros(n), cov).F)
-        K = optimal if given is None else given[k]
+        F = system.measure(np.zeros(n), cov).F
+        K = gain(cov @ system.H.T, F) if given is None else given[k]
         rest = np.eye(n) - K @ system.H
         posterior = symmetric(rest @ cov @ rest.T + K @ system.R @ K.T)
         rows.append((cov, posterior, K))

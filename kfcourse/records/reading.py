@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from tqdm import tqdm
 
 from kfcourse.errors import expect
 from kfcourse.laws import Array
@@ -199,7 +200,9 @@ def _table(path: Path) -> _Table:
     text = _text(path)
     delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
     table = _Table(path, [], [], [], delimiter == ";")
-    for number, line in enumerate(re.split("\r\n|\r|\n", text.rstrip()), 1):
+    lines = re.split("\r\n|\r|\n", text.rstrip())
+    shown_lines = tqdm(lines, desc=path.name, unit="row", disable=None, delay=2)
+    for number, line in enumerate(shown_lines, 1):
         try:
             row = next(csv.reader([line], delimiter=delimiter, strict=True), [])
         except csv.Error as error:
@@ -211,6 +214,13 @@ def _table(path: Path) -> _Table:
         if not table.names:
             table.names.extend(cell.strip() for cell in row)
             continue
+        if len(row) == len(table.names) == 1 and len(line.split()) > 1 < len(
+            table.names[0].split()
+        ):
+            raise RecordError(
+                f"{path} has one column, {shown(table.names[0])}: spaces do not separate cells; "
+                "write commas, tabs or semicolons between them"
+            )
         if len(row or [""]) != len(table.names):
             raise RecordError(
                 f"{path}, line {number}: {len(row)} cells, but the first line names "

@@ -106,8 +106,11 @@ def _noisy(
     true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator
 ) -> Array:
     deviations = np.asarray(sigmas, dtype=float)
-    if deviations.shape not in ((), (3,)) or not (deviations >= 0).all():
-        raise ValueError(f"sigmas must be one number or three, not negative; got {sigmas!r}")
+    good = np.isfinite(deviations).all() and (deviations >= 0).all()
+    if deviations.shape not in ((), (3,)) or not good:
+        raise ValueError(
+            f"sigmas must be one number or three, finite and not negative; got {sigmas!r}"
+        )
     expect_sizes(runs=runs)
     noise = np.random.default_rng(seed).standard_normal((len(true), int(runs), 3))
     return true[:, None, :] + deviations * noise

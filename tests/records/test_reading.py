@@ -157,7 +157,7 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
         (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
         (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2, column y1: .* got 'm'; if this is a line of "
 "units, delete it"),
-        (GOOD.replace(",", " "), "no column 'time'; it has 'time y1 y2 a'"),
+        (GOOD.replace(",", " "), "one column, 'time y1 y2 a': spaces do not separate cells"),
         ("# recorded by me\n" + GOOD, "line 2: 4 cells, .*delete what stands above the names"),
         ("# " + GOOD, "no column 'time'; it has '# time', 'y1'"),
         ("time,y1,y2,a\n1484649904.25,1,2,3\n1484649904.2,1,2,3\n", "1484649904.2 comes after "

@@ -127,6 +127,7 @@ def test_measurements_have_the_given_errors():
 @pytest.mark.parametrize(
     ("sigmas", "runs", "message"),
     [
+        (np.inf, 5, "finite and not negative"),
         ((1.0, 2.0), 3, "one number or three"),
         (-1.0, 3, "not negative"),
         (np.nan, 3, "not negative"),
