@@ -2,10 +2,6 @@
 need.
 
 x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
-
-A meter whose noise enters nonlinearly but can be solved for, such as y = exp(x + w) or y =
-x*exp(w), has with w = omega(x, y) the density p(y | x) = phi(omega(x, y)) |d omega / dy|, phi that
-of N(m_w, D_w).
 """
 
 from __future__ import annotations
@@ -19,6 +15,7 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference
 from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -26,9 +23,7 @@ from kfcourse.symbolic.reading import ModelError, exact_matrix
 TINY = 1e-300  # in place of a variance of exactly 0
 # states on which formulas are tried; eigenvalue of correlations that is none
 TRIALS, ROUNDING = 50, 1e-12
-DIGITS = 1e-6  # of a noise's deviation, to which a solution must give the noise back
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
-Y = sp.Dummy("y", real=True)
 REMEDY = "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
 
 
@@ -41,11 +36,7 @@ class LogLikelihood(Protocol):
 
 class ScalarFormulas(NamedTuple):
     """Means and deviations of the next state and of the measurement, given x: formulas of x and
-    parameters.
-
-    Of a meter whose noise is solved for, those of y with ln p(y | x) = -(y - mean)^2 / (2
-    deviation^2) - ln(sqrt(2 pi) deviation): they contain y, the symbol `Y`.
-    """
+    parameters."""
 
     mean: sp.Expr
     deviation: sp.Expr
@@ -65,10 +56,6 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
     mean, variance = _law(
         model, "object", model.difference_equation("a density"), model.v, model.state_noise
     )
-    if omega := noise_of_meter(model):
-        z = (omega - model.meter_noise.mean[0]) / sp.Float(np.sqrt(model.meter_noise.cov[0, 0]))
-        deviation = 1 / sp.Abs(z.diff(Y))
-        return ScalarFormulas(mean[0], sp.sqrt(variance[0]), Y - z * deviation, deviation)
     meter, meter_variance = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
     return ScalarFormulas(mean[0], sp.sqrt(variance[0]), meter[0], sp.sqrt(meter_variance[0]))
 
@@ -91,8 +78,6 @@ def likelihood(model: Model) -> LogLikelihood:
     The law of a component that is an angle is wound around the circle: the densities of y and of y
     plus whole turns add up.
     """
-    if omega := noise_of_meter(model):
-        return _of_solved(model, omega)
     law = _compiled(
         model, "likelihood", _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
     )
@@ -163,15 +148,10 @@ def _law(
     """Mean and covariance of what an equation gives, as formulas; ModelError if they are not those
     of a density."""
     B = equation.jacobian(sp.Matrix(noise))
-    decided = any(
-        condition.has(*noise)
-        for choice in equation.atoms(sp.Piecewise)
-        for _, condition in choice.args
-    )
-    if B.has(*noise) or decided:
+    if B.has(*noise) or decides(equation, noise):
         raise _no_density(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple density; "
-            f"{REMEDY}"
+            f"measure what is linear in the noise, such as ln y of y = exp(x + w), or {REMEDY}"
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
@@ -210,50 +190,6 @@ def has_object_noise(model: Model) -> bool:
         model.state_noise.cov
     )
     return not B.subs(model.values).is_zero_matrix
-
-
-def noise_of_meter(model: Model) -> sp.Expr | None:
-    """omega(x, Y), the noise of a scalar meter in which it enters nonlinearly; None if it is linear
-    or not to be had.
-
-    SymPy solves; which of its solutions is the noise, trials tell.
-    """
-    if model.p != 1 or len(model.w) != 1 or model.timed or model.angles.y:
-        return None
-    w, equation = model.w[0], model.meter_equation[0].subs(model.values)
-    deviation = float(np.sqrt(model.meter_noise.cov[0, 0]))
-    if not (equation.diff(w).has(w) and deviation > 0):
-        return None
-    try:
-        solutions = sp.solve(equation - Y, w)
-    except NotImplementedError:
-        return None
-    states = _states(model).T
-    noises = model.meter_noise.mean + deviation * np.random.default_rng(1).standard_normal(TRIALS)
-    for solution in solutions:
-        try:
-            with np.errstate(all="ignore"):
-                y = sp.lambdify([*model.x, w], equation)(*states, noises)
-                back = sp.lambdify([*model.x, Y], solution)(*states, y)
-        # a solution that cannot be computed, such as Lambert's function
-        except (NameError, TypeError):
-            continue
-        if not solution.has(sp.I) and np.all(np.abs(back - noises) <= DIGITS * deviation):
-            return solution
-    return None
-
-
-def _of_solved(model: Model, omega: sp.Expr) -> LogLikelihood:
-    compiled = sp.lambdify([*model.x, Y], [omega, sp.log(sp.Abs(omega.diff(Y)))])
-    law = model.meter_noise
-
-    def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
-        with np.errstate(all="ignore"):  # y that no noise makes
-            noise, log_slope = compiled(*np.moveaxis(x, -1, 0), y[..., 0])
-            value = log_normal((noise - law.mean[0])[..., None], law.cov) + log_slope
-        return np.where(np.isnan(y[..., 0]), 0.0, np.where(np.isnan(value), -np.inf, value))
-
-    return log_likelihood
 
 
 def _no_density(message: str) -> ModelError:

@@ -41,6 +41,7 @@ from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.typesetting import aligned
 from kfcourse.symbolic.writing import formula_lines
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
@@ -119,7 +120,7 @@ class Structure:
                 value = f"{FUNCTION_LATEX[name]}{index}({names})"
                 first, *further = formula_lines(matrix[i, j], arguments, value)
                 lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]
-        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+        return aligned(lines)
 
     def source(self) -> str:
         """The generated NumPy code that runs."""
