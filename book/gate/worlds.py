@@ -143,7 +143,7 @@ def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
     for _ in range(rounds):
         values = []
         for line in lines:
-            made = _made(*line.split("=", 1), letters)
+            made = _made(*re.fullmatch('((?:".*")?[^=]*)=(.*)', line).groups(), letters)
             letters |= made
             values += [np.array(value) for value in made.values() if not callable(value)]
         if before and all(
