@@ -4,8 +4,6 @@ r"""Plants changes in the relations that the book displays, and counts what noth
     python -m gate.plant                each typed relation of each page, changed in each way it can
                                         be: by chapter and kind
     python -m gate.plant --seed 7       other places of the changes
-    python -m gate.plant --checked 20   and changes in 20 checked expressions, for which cells are
-                                        executed
     python -m gate.plant grid --show    one chapter, and each change that nothing noticed
 
 A change is a sign, a factor, an index, or a transposition.  It is noticed if the relation no longer
@@ -27,9 +25,8 @@ from typing import Any, NamedTuple
 
 import jupytext
 import numpy as np
-from matplotlib import pyplot as plt
 
-from gate.page import Formula, Letters, calls, cells, formulas, letters_of, outside_points
+from gate.page import Formula, Letters, formulas, letters_of, outside_points
 from gate.tex import is_relation, normal, pieces
 from kfcourse.pages import Unverified
 
@@ -81,54 +78,6 @@ def noticed(letters: Letters, formula: Formula, elsewhere: str = "") -> bool:
         with np.errstate(invalid="ignore"):  # a changed sign under a root
             letters.judge(formula, elsewhere)
     except Unverified:
-        return True
-    return False
-
-
-def in_cells(page: Path, chance: random.Random) -> Planted | None:
-    """A sign or a factor changed in a checked expression of a page, whose cells are executed up to
-    there."""
-    text = page.read_text(encoding="utf-8")
-    places = [
-        (code, node)
-        for code in cells(text)
-        for call in calls(code, "verified")
-        for side in call.args
-        for node in ast.walk(side)
-        if _changeable(node) and text.count(code) == 1
-    ]
-    if not places:
-        return None
-    code, node = chance.choice(places)
-    before = ast.get_source_segment(code, node) or ""
-    kind = "factor" if isinstance(node, ast.Constant) else "sign"
-    after = f"(-({before}))" if kind == "sign" else str(node.value + 1)
-    lines = code.splitlines(keepends=True)
-    start = sum(map(len, lines[: node.lineno - 1])) + len(
-        lines[node.lineno - 1].encode()[: node.col_offset].decode()
-    )
-    changed = code[:start] + after + code[start + len(before) :]
-    return Planted(
-        page.stem, "checked", kind, before, after, stops(text.replace(code, changed), changed)
-    )
-
-
-def _changeable(node: ast.AST) -> bool:
-    """A product or a sum, or a whole number in one; not an index, which ast shows inside a
-    Subscript."""
-    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value > 1
-    return number or (
-        isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
-    )
-
-
-def stops(chapter: str, changed: str) -> bool:
-    """Does the changed cell raise, or one after it?"""
-    try:
-        run(chapter, changed, False)
-    except NameError:  # of a cell left out: nothing was tried
-        raise
-    except Exception:  # whatever stops the build
         return True
     return False
 
@@ -212,7 +161,7 @@ def report(found: list[Planted]) -> str:
     """Planted and unnoticed changes, by chapter and kind of display: a table."""
     columns = [
         (where, kind)
-        for where in ("display", "box", "point", "sentence", "side", "name", "checked")
+        for where in ("display", "box", "point", "sentence", "side", "name")
         for kind in KINDS
     ]
     columns = [one for one in columns if any((row.where, row.kind) == one for row in found)]
@@ -246,7 +195,6 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seed", type=int, default=53)
-    parser.add_argument("--checked", type=int, default=0)
     parser.add_argument(
         "--show", action="store_true", help="print each change that nothing noticed"
     )
@@ -255,10 +203,6 @@ def main() -> int:
     chance = random.Random(given.seed)
     pages = [BOOK / f"{name}.md" for name in given.pages] or sorted(set(BOOK.glob("*.md")) - {MADE})
     found = [one for page in pages for one in planted(page, chance)]
-    plt.show = lambda: plt.close("all")
-    with_cells = [page for page in pages if next(cells(page.read_text(encoding="utf-8")), "")]
-    for page in chance.choices(with_cells, k=given.checked):
-        found += [one for one in [in_cells(page, chance)] if one]
     for one in found:
         if given.show and not one.noticed:
             print(f"{one.page}, {one.where}, {one.kind}\n  {one.before}\n  {one.after}")

@@ -35,7 +35,6 @@ from gate.values import (
     block,
     divided,
     inverse,
-    is_matrix,
     multiplied,
     raised,
     root,
@@ -311,19 +310,12 @@ class Reader:
                 if follows == "_":
                     return key
                 key = key._replace(value=key.value.plain)
-            if is_matrix(key.value) and self._is_entry(len(key.words)):
-                return key._replace(value=Indexed(lambda i, j, A=key.value: A[i - 1, j - 1]))
             if isinstance(key.value, At):
                 called = self._is_call(len(key.words))
                 key = key._replace(value=key.value.function if called else key.value.plain)
             if key.value is not None and follows not in ("'", "_"):
                 return key
         return None
-
-    def _is_entry(self, words: int) -> bool:
-        """Do two numbers follow so many words, row and column of a matrix: the 12 of A_{12}?"""
-        index = [self._after(words + place) for place in range(5)]
-        return index[:2] + index[4:] == ["_", "{", "}"] and "".join(index[2:4]).isdigit()
 
     def _entered(self, key: Key) -> Value:
         """What a letter stands for; arguments and indices are read with it."""
@@ -336,6 +328,8 @@ class Reader:
             self.take("_")
             indices = self._subscript(self._group())
             value = self.compute(lambda *places: key.value[tuple(map(whole, places))], *indices)
+            if isinstance(value, At):
+                value = value.function if self._is_call() else value.plain
             return self._applied(value) if callable(value) and self._is_call() else value
         if isinstance(value, Operator):
             return self.compute(value.function, self.product())

@@ -15,6 +15,7 @@ A world is a text whose lines are done one after another::
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
     again:                             what follows, down to `then:`, again and again until nothing
                                        changes
+    entries: p                         p_{12} is in row 1 and column 2 of the matrix p
     keep: K, p                         forget all other letters; `forget: a, b` these
     "|v|" = \sqrt{v^Tv}                a letter that looks like something else; `"p(x|z)" of x =
                                        ...` moves with x
@@ -82,7 +83,7 @@ def _kind(line: str, stepped: set[str]) -> str:
     left, equals, _ = line.partition("=")
     if line in ("again:", "then:"):
         return line[:-1]
-    if not equals or line.startswith(("keep: ", "forget: ")):
+    if not equals or line.startswith(("keep: ", "forget: ", "entries: ")):
         return "draw"
     if left.startswith('"'):
         return "once"
@@ -97,6 +98,11 @@ def _drawn(
     if names == "forget":
         return {
             name: value for name, value in letters.items() if name not in what.strip().split(", ")
+        }
+    if names == "entries":
+        matrices = {name: letters[name] for name in what.strip().split(", ")}
+        return letters | {
+            name: Indexed(lambda i, j, A=A: A[i - 1, j - 1], A) for name, A in matrices.items()
         }
     if names == "keep":
         return {name: letters[name] for name in what.strip().split(", ")}
@@ -214,6 +220,15 @@ def column(values: Any) -> np.ndarray:
     return np.asarray(values, float).reshape(-1, 1)
 
 
+def shared_readings(rng: np.random.Generator) -> tuple[Any, ...]:
+    """Twelve states that share three measurements: their masses, the states, their means given the
+    measurement, and another function of it."""
+    mass, x = rng.dirichlet(np.ones(12)), rng.normal(size=12)
+    seen = np.repeat(np.arange(3), 4)
+    best = np.array([np.average(x[seen == y], weights=mass[seen == y]) for y in seen])
+    return mass, x, best, rng.normal(size=3)[seen]
+
+
 def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     r"""The letters A, H, Q, R, I and \\lambda, \\Psi, K, z, p, \\nu, F, y with the index k, from
     `kfcourse.filters.kalman`.
@@ -261,18 +276,15 @@ def _bent(turn: str, mixed: str) -> Model:
     )
 
 
-def _bent_scalar(turn: str, mixed: str) -> Model:
-    return Model.define(
-        f"0.8*x + {turn}*sin(x) + (0.4 + 0.1*x)*v",
-        f"x + {mixed}*x**2 + 0.5*w",
-        {},
-        prior={"mean": 0.5, "variance": 0.4},
-    )
-
-
-BENT, BENT_SCALAR = _bent("0.3", "0.2"), _bent_scalar("0.3", "0.2")
-# Other ones at each step: f_k is not f_{k+1}.
-BENT_LATER, BENT_SCALAR_LATER = _bent("0.1*k", "0.1*k"), _bent_scalar("0.1*k", "0.1*k")
+BENT = _bent("0.3", "0.2")
+BENT_SCALAR = Model.define(
+    "0.8*x + 0.3*sin(x) + (0.4 + 0.1*x)*v",
+    "x + 0.2*x**2 + 0.5*w",
+    {},
+    prior={"mean": 0.5, "variance": 0.4},
+)
+# Another one at each step: f_k is not f_{k+1}.
+BENT_LATER = _bent("0.1*k", "0.1*k")
 
 
 def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any]:

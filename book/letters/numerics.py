@@ -1,4 +1,4 @@
-"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array."""
+"""The letters of numerics.md: corrections of the package, and the array."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -34,15 +34,6 @@ def _corrected(rng, seen):
     }
 
 
-def any_gain(rng):
-    """Cov((I - K H) e - K w) for a gain that is not the optimal one."""
-    found = _corrected(rng, 2)
-    K = rng.normal(size=(3, 2))
-    both = np.hstack([np.eye(3) - K @ found["H"], -K])
-    joint = np.block([[found[r"\Psi"], np.zeros((3, 2))], [np.zeros((2, 3)), found["R"]]])
-    return found | {"K": K, "p": both @ joint @ both.T}
-
-
 def wrong_gain(rng):
     found = _corrected(rng, 1)
     return found | {
@@ -74,26 +65,18 @@ def array(rng):
     }
 
 
-def one_measurement(rng):
-    """A scalar measurement, and the prediction's root in the words of the text."""
-    own, scalar = array(rng), _corrected(rng, 1)
-    F = scalar["H"] @ scalar[r"\Psi"] @ scalar["H"].T + scalar["R"]
+def in_words(rng):
+    """The prediction's root in the words of the text."""
+    own = array(rng)
     wide = np.hstack([own["A"] @ own["S"], np.linalg.cholesky(own["Q"])])
-    T, _ = np.linalg.qr(wide.T, mode="complete")
-    turned = {
+    return {
         r"(AS\;\;Q^{1/2})": wide,
-        "T": T,
+        "T": np.linalg.qr(wide.T, mode="complete")[0],
         r"(S'\;\;0)": np.hstack([own["S'"], np.zeros((3, 3))]),
     }
-    return turned | {
-        "p": scalar["p"],
-        r"\Psi": scalar[r"\Psi"],
-        "R": scalar["R"].item(),
-        "F": F.item(),
-    }
 
 
-LETTERS = (any_gain, wrong_gain, array, one_measurement)
+LETTERS = (wrong_gain, array, in_words)
 _BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
 _AFTER = r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}"
 _BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"

@@ -83,6 +83,7 @@ then:
 \nu = H(Ae+Ba_0)
 \ell = He
 forget: e, s, C, I
+entries: \Psi, p
 """
 
 
