@@ -23,7 +23,8 @@ def scalar(rng):
     off = [nu**2 / (H**2 * Psi + run["D_n"]) for nu, H, Psi in _together(run, r"\nu", "H", r"\Psi")]
     at_any = {"x": Indexed(rng.normal(size=len(off))), "d": Indexed([-one / 2 for one in off])}
     now = {"S'": at_k(run["H"].values), "S": at_k(S)}
-    return {name: run[name] for name in run if name not in ("H", "I")} | at_any | now
+    matrices = ("H", r"\Phi", "I")  # whose transpositions a scalar does not tell
+    return {name: run[name] for name in run if name not in matrices} | at_any | now
 
 
 def vector(rng):
