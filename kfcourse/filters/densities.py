@@ -7,14 +7,13 @@ x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product as cartesian
 from typing import NamedTuple, Protocol
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.angles import TURN, Components, difference
-from kfcourse.laws import Array, Gaussian
+from kfcourse.angles import difference
+from kfcourse.laws import Array, Gaussian, without_missing
 from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -23,7 +22,6 @@ from kfcourse.symbolic.reading import ModelError, exact_matrix
 TINY = 1e-300  # in place of a variance of exactly 0
 # states on which formulas are tried; eigenvalue of correlations that is none
 TRIALS, ROUNDING = 50, 1e-12
-MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 REMEDY = "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
 
 
@@ -73,11 +71,7 @@ def transition(model: Model) -> Callable[..., Gaussian]:
 
 def likelihood(model: Model) -> LogLikelihood:
     """(y (..., p), x (..., n)) -> log p(y | x) (...); what of y is missing (NaN) does not enter, 0
-    where all is.
-
-    The law of a component that is an angle is wound around the circle: the densities of y and of y
-    plus whole turns add up.
-    """
+    where all is; of an angle the short way round counts."""
     law = _compiled(
         model, "likelihood", _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
     )
@@ -91,23 +85,9 @@ def likelihood(model: Model) -> LogLikelihood:
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
         mean, cov = law.at(k)(x)
         innovation, missing = difference(y, mean, model.angles.y), np.isnan(y)
-        sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
-        either = missing[..., :, None] | missing[..., None, :]
-        if missing.any():
-            innovation, cov = (
-                np.where(missing, 0.0, innovation),
-                np.where(either, np.eye(model.p), cov),
-            )
-
-        # what is missing is counted once, in no turn, as N(0; 0, 1)
-        def of_present(turns: Array) -> Array:
-            return np.where(
-                (missing & (turns != 0)).any(axis=-1), -np.inf, log_normal(innovation + turns, cov)
-            )
-
-        value = wound(of_present, sd, model.angles.y) + 0.5 * np.log(2 * np.pi) * missing.sum(
-            axis=-1
-        )
+        if missing.any():  # what is missing counts as N(0; 0, 1), which is taken off again
+            innovation, _, cov, _ = without_missing(innovation, cov, cov, cov)
+        value = log_normal(innovation, cov) + 0.5 * np.log(2 * np.pi) * missing.sum(axis=-1)
         return np.where(missing.all(axis=-1), 0.0, value)
 
     return log_likelihood
@@ -123,23 +103,6 @@ def log_normal(innovation: Array, cov: Array) -> Array:
             return -0.5 * (innovation[..., 0] ** 2 / variance + np.log(2 * np.pi * variance))
         square = (innovation * np.linalg.solve(cov, innovation[..., None])[..., 0]).sum(axis=-1)
         return -0.5 * (square + np.linalg.slogdet(cov)[1] + size * np.log(2 * np.pi))
-
-
-def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) -> Array:
-    """log of the density of angles: the sum over all turns (p,) of the density of what was measured
-    plus these turns.
-
-    Eight standard deviations (p,) are covered, and one turn at least.
-    """
-    if not angles:
-        return log_density(np.zeros(len(sd)))
-    most = np.clip(np.ceil((8 * sd + np.pi) / TURN), 1, MOST_TURNS).astype(int)
-    total = np.array(-np.inf)
-    for numbers in cartesian(
-        *(range(-most[i], most[i] + 1) if i in angles else (0,) for i in range(len(sd)))
-    ):
-        total = np.logaddexp(total, log_density(TURN * np.array(numbers)))
-    return total
 
 
 def _law(
@@ -171,17 +134,13 @@ def _compiled(model: Model, name: str, law: tuple[sp.MatrixBase, sp.MatrixBase])
 def _singular(law: Stepwise, model: Model) -> bool:
     """Whether the covariance is singular at all states tried: the determinant of long formulas
     takes SymPy minutes."""
+    away = np.random.default_rng(0).standard_normal((TRIALS, model.n))
     with np.errstate(all="ignore"):
-        cov = law.at(0)(_states(model))[1]
+        cov = law.at(0)(model.prior.mean + away * np.sqrt(np.diagonal(model.prior.cov)))[1]
         deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
         correlation = cov / (deviation[..., :, None] * deviation[..., None, :])
     good = np.isfinite(correlation).all(axis=(-2, -1))
     return not (np.linalg.eigvalsh(correlation[good])[..., 0] > ROUNDING).any()
-
-
-def _states(model: Model) -> Array:
-    away = np.random.default_rng(0).standard_normal((TRIALS, model.n))
-    return model.prior.mean + away * np.sqrt(np.diagonal(model.prior.cov))
 
 
 def has_object_noise(model: Model) -> bool:

@@ -200,15 +200,6 @@ class JumpModel:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
 
-    def replace(self, **parameters: float) -> JumpModel:
-        """The same model with parameters changed in all modes."""
-        modes = tuple(mode.replace(**parameters) for mode in self.modes)
-        if self.chain.has(*map(symbol, parameters)):
-            raise ModelError(
-                f"`transition` contains {', '.join(parameters)}: define the model anew"
-            )
-        return JumpModel(self.names, modes, self.first, self.chain, self.chain_of_step)
-
     def latex(self) -> str:
         """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned`
         block."""

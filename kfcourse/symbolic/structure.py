@@ -399,10 +399,10 @@ def _expanded(matrix: sp.ImmutableMatrix, **hints: bool) -> sp.ImmutableMatrix:
 
 def expect_each(structures: Sequence[Structure], what: str) -> None:
     """TypeError unless these are structural functions, a list of them."""
-    if isinstance(structures, Structure):
+    if isinstance(structures, Structure) or not structures:
         raise TypeError(
-            f"{what} expects a list of structures, one a mode, and one came: give "
-            f"[{structures.name}, ...]"
+            f"{what} expects a list of structures, one a mode, such as [linearised(mode) for mode "
+            "in model.modes]"
         )
     for structure in structures:
         expect(structure, Structure, what)

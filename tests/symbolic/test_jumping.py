@@ -37,8 +37,6 @@ def test_a_mode_is_a_model_of_what_holds_for_all_and_of_what_differs():
     assert model.modes[1] == Model.define("c*x + 3 + v", "x + C*w", {"c": 0.5, "C": 7})
     assert model.modes[1].state_noise.cov == 4 and model.prior.mean == 2
     assert (model.n, model.p, model.names) == (1, 1, ("a", "b"))
-    changed = model.replace(c=0.25)
-    assert [float(mode.parameters["c"]) for mode in changed.modes] == [0.25, 0.25]
 
 
 def test_a_single_row_is_a_mode_drawn_anew_at_each_step():
