@@ -240,7 +240,7 @@ def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     Q, R = covariance(rng, states), covariance(rng, seen)
     system = LinearSystem(A, H, Q, R)
     law = Gaussian(rng.normal(size=states), covariance(rng, states))
-    found: dict[str, list[Any]] = {
+    series: dict[str, list[Any]] = {
         name: [] for name in (r"\lambda", r"\Psi", "y", "K", "z", "p", r"\nu", "F")
     }
     for _ in range(_STEPS):
@@ -255,10 +255,10 @@ def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
             posterior.cov,
             y - H @ law.mean,
         )
-        for name, value in zip(found, (*row, H @ law.cov @ H.T + R), strict=True):
-            found[name].append(column(value) if np.ndim(value) == 1 else value)
+        for name, value in zip(series, (*row, H @ law.cov @ H.T + R), strict=True):
+            series[name].append(column(value) if np.ndim(value) == 1 else value)
         law = predict(system, posterior)
-    letters = {name: Indexed(values, values[2]) for name, values in found.items()}
+    letters = {name: Indexed(values, values[2]) for name, values in series.items()}
     return {"A": A, "H": H, "Q": Q, "R": R, "I": np.eye(states), "k": K_RANGE} | letters
 
 
@@ -313,7 +313,7 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
     D_n = np.array(see.jacobian(model.w) * see.jacobian(model.w).T, dtype=float)
     ekf = aof(linearised(model))
     state = ekf.init(1)
-    found: dict[str, list[Any]] = {
+    series: dict[str, list[Any]] = {
         name: [] for name in (r"\lambda", r"\Psi", "y", "z", "p", "H", "K", r"\nu", r"\Phi", "g")
     }
     for k, y in enumerate(simulate(model, runs=1, steps=_STEPS, seed=int(rng.integers(1 << 30))).y):
@@ -322,10 +322,10 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
         H = slope(S[k], lam)
         K, nu = p @ H.T @ np.linalg.inv(D_n), column(y) - S[k](lam)
         row = (lam, Psi, column(y), z, p, H, K, nu, slope(f[k], z), noise[k](z) @ unmixed)
-        for name, value in zip(found, row, strict=True):
-            found[name].append(value)
-    found |= {"f": f, "S": S}
-    letters = {name: Indexed(values, values[2]) for name, values in found.items()}
+        for name, value in zip(series, row, strict=True):
+            series[name].append(value)
+    series |= {"f": f, "S": S}
+    letters = {name: Indexed(values, values[2]) for name, values in series.items()}
     return {r"D_\xi": D_xi, "D_n": D_n, "I": np.eye(len(model.x)), "k": K_RANGE} | letters
 
 
@@ -378,14 +378,14 @@ def chain_run(
     A plain program: every sum is a loop over the nodes; likelihood(y, x) is p(y | x).
     """
     size = range(len(nodes))
-    mass, rows = [float(one) for one in start], []
+    mass, rows = [float(share) for share in start], []
     for y in rng.normal(size=_STEPS):
         joint = [mass[j] * likelihood(y, nodes[j]) for j in size]
-        after = [one / sum(joint) for one in joint]
+        after = [share / sum(joint) for share in joint]
         z = sum(nodes[j] * after[j] for j in size)
         p = sum(nodes[j] ** 2 * after[j] for j in size) - z**2
         rows.append((Masses.of(mass), Masses.of(after), 1 / sum(joint), z, p, y))
         mass = [sum(after[i] * P[i, j] for i in size) for j in size]
     names = (r"\mu^-", r"\mu", "C", "z", "p", "y")
-    found = {name: Indexed([row[place] for row in rows]) for place, name in enumerate(names)}
-    return found | {"P": Indexed(P, P), "x": Indexed(nodes), "i": size, "j": size, "k": K_RANGE}
+    series = {name: Indexed([row[place] for row in rows]) for place, name in enumerate(names)}
+    return series | {"P": Indexed(P, P), "x": Indexed(nodes), "i": size, "j": size, "k": K_RANGE}

@@ -45,9 +45,9 @@ def against_the_bound(rng):
 def linearised_start(rng):
     """The linearised AOF of the lab's model at its first measurement."""
     g, e = rng.uniform(0.5, 2, size=2)
-    one = aof(linearised(Model.define("0.9*x + e*x*v", "g*x + 0.3*x**2*w", {"g": g, "e": e})))
+    ekf = aof(linearised(Model.define("0.9*x + e*x*v", "g*x + 0.3*x**2*w", {"g": g, "e": e})))
     y = rng.normal()
-    state = one.step(one.init(1), np.array([[y]]))
+    state = ekf.step(ekf.init(1), np.array([[y]]))
     z, Psi = state.posterior.mean.item(), state.predicted.cov.item()
     return {"g": g, "e": e, "y": Indexed([y]), "z": Indexed([z]), r"\Psi": Indexed([1.0, Psi])}
 

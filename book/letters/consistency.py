@@ -50,7 +50,7 @@ def spread(cov):
 def of_points(rng):
     """Means over points that have the covariances of the normal laws."""
     p, P, K, H = covariance(rng, 2), covariance(rng, 3), rng.normal(size=(2, 1)), rng.normal(size=2)
-    Phi, one = rng.normal(size=(2, 2)), covariance(rng, 2)
+    Phi, mixed = rng.normal(size=(2, 2)), covariance(rng, 2)
     H = H[None]
     joint = np.block([[P[:2, :2], np.zeros((2, 1))], [np.zeros((1, 2)), P[2:, 2:]]])
     pairs = []
@@ -59,14 +59,14 @@ def of_points(rng):
         nu = H @ e + n
         pairs.append(((H @ Phi @ (e - K @ nu)) * nu, nu * nu, e * nu))
     product, F, gain = (np.mean(values, axis=0) for values in zip(*pairs, strict=True))
-    nees = [e.T @ np.linalg.solve(p, e) for e in spread(one)]
-    traces = [np.trace(np.linalg.solve(p, e @ e.T)) for e in spread(one)]
+    nees = [e.T @ np.linalg.solve(p, e) for e in spread(mixed)]
+    traces = [np.trace(np.linalg.solve(p, e @ e.T)) for e in spread(mixed)]
     means = {
         r"\mathsf M(e^Tp^{-1}e)": np.mean(nees),
         r"\mathsf M\operatorname{tr}(p^{-1}ee^T)": np.mean(traces),
         r"\mathsf M(\nu_{k+1}\nu_k)": product.item(),
     }
-    known = {"p": p, "P": one, "H": H, r"\Phi": Phi, "K": K, "F": F.item(), "K_*": gain / F}
+    known = {"p": p, "P": mixed, "H": H, r"\Phi": Phi, "K": K, "F": F.item(), "K_*": gain / F}
     return known | means | {r"\operatorname{tr}": np.trace}
 
 

@@ -24,8 +24,8 @@ def measure(lam, Psi):
 def fitted(target, *regressors):
     """Slopes (1, r), offset and the variance left, by least squares."""
     rows = np.vstack([*regressors, np.ones(RUNS)])
-    found = np.linalg.lstsq(rows.T, target, rcond=None)[0]
-    return found[None, :-1], found[-1], np.var(target - found @ rows)
+    fit = np.linalg.lstsq(rows.T, target, rcond=None)[0]
+    return fit[None, :-1], fit[-1], np.var(target - fit @ rows)
 
 
 def windowed(rng):

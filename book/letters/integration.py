@@ -15,7 +15,7 @@ def sensors(rng):
     S = [np.sin, np.cos, np.exp, np.tanh, np.cosh]
     slow, radio = (
         lam + eps,
-        [one(value) + noise for one, value, noise in zip(S, lam, n, strict=True)],
+        [signal(value) + noise for signal, value, noise in zip(S, lam, n, strict=True)],
     )
     y, at = rng.normal(size=2)
     step = 1e-20

@@ -37,7 +37,7 @@ def ensemble(rng):
     x = [rng.normal(size=RUNS)]
     for _ in range(STEPS):
         x.append(a(x[-1], rng.normal(size=RUNS)))
-    return x, [b(one, rng.normal(size=RUNS)) for one in x]
+    return x, [b(part, rng.normal(size=RUNS)) for part in x]
 
 
 def fitted(target, regressor):
@@ -50,13 +50,13 @@ def at_k(values):
     return Of(lambda k: values[k], "k")
 
 
-def covariance(one, other=None):
-    return np.cov(one, one if other is None else other, bias=True)[0, 1]
+def covariance(part, other=None):
+    return np.cov(part, part if other is None else other, bias=True)[0, 1]
 
 
 def collected(rows, **more):
-    found = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
-    return found | {"k": range(1, STEPS - 1)} | more
+    known = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
+    return known | {"k": range(1, STEPS - 1)} | more
 
 
 def two_step(rng):
@@ -93,16 +93,16 @@ def optimal_structure(rng):
         before = tau(rows[-1]["u"], rows[-1]["T"]) if rows else s
         rows.append(row | {"u": u, "T": T, "x": x[k], "y": y[k], "s": before})
         lam, Psi = np.polyval([L, n], s), Theta(u, T)
-    found = collected(rows)
+    known = collected(rows)
     functions = {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
-    return found | functions | {name: at_k(found[name].values) for name in "hGFLn"}
+    return known | functions | {name: at_k(known[name].values) for name in "hGFLn"}
 
 
 def plain_prediction(rng):
     """The prediction of the filter of optimal structure, without the second fit."""
     own = optimal_structure(rng)
     u, T = own["u"].values, own["T"].values
-    ahead = [tau(*one) for one in zip(u, T, strict=True)]
+    ahead = [tau(*part) for part in zip(u, T, strict=True)]
     return {
         "u": own["u"],
         "T": own["T"],
@@ -129,7 +129,7 @@ def optimal(rng):
     """The package's filter with several components."""
     own = extended_run(rng, BENT)
     H, lam, S, structure = own["H"].values, own[r"\lambda"].values, own["S"].plain, linearised(BENT)
-    F = [one @ Psi @ one.T + own["D_n"] for one, Psi in zip(H, own[r"\Psi"].values, strict=True)]
+    F = [part @ Psi @ part.T + own["D_n"] for part, Psi in zip(H, own[r"\Psi"].values, strict=True)]
 
     def moved(z, p):
         law = structure.predict(z.T, p[None])

@@ -21,7 +21,10 @@ def scalar(rng):
     run = extended_run(rng, BENT_SCALAR)
     S = [run["S"].plain(lam) for lam in run[r"\lambda"].values]
     off = [nu**2 / (H**2 * Psi + run["D_n"]) for nu, H, Psi in _together(run, r"\nu", "H", r"\Psi")]
-    at_any = {"x": Indexed(rng.normal(size=len(off))), "d": Indexed([-one / 2 for one in off])}
+    at_any = {
+        "x": Indexed(rng.normal(size=len(off))),
+        "d": Indexed([-square / 2 for square in off]),
+    }
     now = {"S'": at_k(run["H"].values), "S": at_k(S)}
     matrices = ("H", r"\Phi", "I")  # whose transpositions a scalar does not tell
     return {name: run[name] for name in run if name not in matrices} | at_any | now

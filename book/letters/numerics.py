@@ -35,24 +35,24 @@ def _corrected(rng, seen):
 
 
 def wrong_gain(rng):
-    found = _corrected(rng, 1)
-    return found | {
+    known = _corrected(rng, 1)
+    return known | {
         r"\epsilon": 0.3,
         r"\gamma": rng.normal(size=(3, 1)),
-        "F": found["H"] @ found[r"\Psi"] @ found["H"].T + found["R"],
+        "F": known["H"] @ known[r"\Psi"] @ known["H"].T + known["R"],
     }
 
 
 def array(rng):
     """The orthogonal matrix by NumPy's QR decomposition, for the correction and for the
     prediction."""
-    found = _corrected(rng, 2)
-    S, Q = np.linalg.cholesky(found[r"\Psi"]), covariance(rng, 3)
-    wide = np.block([[np.linalg.cholesky(found["R"]), found["H"] @ S], [np.zeros((3, 2)), S]])
+    known = _corrected(rng, 2)
+    S, Q = np.linalg.cholesky(known[r"\Psi"]), covariance(rng, 3)
+    wide = np.block([[np.linalg.cholesky(known["R"]), known["H"] @ S], [np.zeros((3, 2)), S]])
     T, right = np.linalg.qr(wide.T)
-    ahead = np.hstack([found["A"] @ S, np.linalg.cholesky(Q)])
+    ahead = np.hstack([known["A"] @ S, np.linalg.cholesky(Q)])
     turned, root = np.linalg.qr(ahead.T)
-    return found | {
+    return known | {
         "S": S,
         "Q": Q,
         "T": T,
@@ -61,7 +61,7 @@ def array(rng):
         "Z": right.T[2:, 2:],
         "S'": root.T,
         "T'": turned,
-        "F": np.linalg.solve(np.eye(2) - found["H"] @ found["K"], found["R"]),
+        "F": np.linalg.solve(np.eye(2) - known["H"] @ known["K"], known["R"]),
     }
 
 

@@ -97,28 +97,28 @@ def growing(rng):
 
 
 def _followed(rng):
-    found = axis(rng)
-    one = kinematic(found["T"], noise_sd=found[r"\sigma_a"], measurement_sd=SIGMA)
+    known = axis(rng)
+    of_axis = kinematic(known["T"], noise_sd=known[r"\sigma_a"], measurement_sd=SIGMA)
     y = rng.normal(size=(6, 1, 3))
-    return found, y[:, 0, 0], run(alpha_beta(one, ALPHA, steady_beta(ALPHA)), y).mean[:, 0, ::3]
+    return known, y[:, 0, 0], run(alpha_beta(of_axis, ALPHA, steady_beta(ALPHA)), y).mean[:, 0, ::3]
 
 
 def start(rng):
-    found, y, states = _followed(rng)
-    return {"T": found["T"], "y": Indexed(y), "r": states[1, 0], "s": states[1, 1]}
+    known, y, states = _followed(rng)
+    return {"T": known["T"], "y": Indexed(y), "r": states[1, 0], "s": states[1, 1]}
 
 
 def step(rng):
     """The fourth measurement: the memory still grows."""
-    found, y, states = _followed(rng)
+    known, y, states = _followed(rng)
     gains = growing(rng)
     return {
-        "T": found["T"],
+        "T": known["T"],
         "r": states[2, 0],
         "s": states[2, 1],
-        "r^-": (found["A"] @ states[2])[0],
+        "r^-": (known["A"] @ states[2])[0],
         "y": y[3],
-        r"\nu": y[3] - (found["A"] @ states[2])[0],
+        r"\nu": y[3] - (known["A"] @ states[2])[0],
         r"\alpha": ALPHA,
         r"\beta": steady_beta(ALPHA),
         r"\alpha_k": gains[r"\alpha"][4,],
@@ -130,14 +130,14 @@ def step(rng):
 
 def controlled(rng):
     """A run with the control."""
-    found = axis(rng)
+    known = axis(rng)
     y = rng.normal(size=(6, 1, 2))
-    u = np.nan_to_num(acceleration_from(y, found["T"]))[..., :1]
-    Q = (found["Q"] + found["Q"].T) / 2
-    system = LinearSystem(found["A"], found["H"], Q, np.array([[SIGMA**2]]), found["B"])
+    u = np.nan_to_num(acceleration_from(y, known["T"]))[..., :1]
+    Q = (known["Q"] + known["Q"].T) / 2
+    system = LinearSystem(known["A"], known["H"], Q, np.array([[SIGMA**2]]), known["B"])
     law = run_linear(system, Gaussian(rng.normal(size=2), covariance(rng, 2)), y[..., :1], u)
-    z, lam = ([column(one) for one in laws.mean[:, 0]] for laws in (law.posterior, law.predicted))
-    return found | {
+    z, lam = ([column(mean) for mean in laws.mean[:, 0]] for laws in (law.posterior, law.predicted))
+    return known | {
         r"\lambda": Indexed(lam),
         "z": Indexed(z),
         "u": Indexed(u[:, 0, 0]),
@@ -154,7 +154,7 @@ def polar(rng):
         return np.array([abs(complex(*x)), np.angle(complex(*x))])
 
     steps = 1e-6 * np.eye(2)
-    H = np.column_stack([(h(x + one) - h(x - one)) / 2e-6 for one in steps])
+    H = np.column_stack([(h(x + step) - h(x - step)) / 2e-6 for step in steps])
     return {
         "r_x": x[0],
         "r_y": x[1],

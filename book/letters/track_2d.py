@@ -18,23 +18,23 @@ def _run(rng, lost=None):
     y, u = rng.normal(size=(5, 1, 2)), rng.normal(size=(5, 1, 2))
     if lost is not None:
         y[lost] = np.nan
-    found = run(system, Gaussian(rng.normal(size=4), covariance(rng, 4)), y, u)
+    laws = run(system, Gaussian(rng.normal(size=4), covariance(rng, 4)), y, u)
     (z, p), (lam, Psi) = (
-        ([column(one[0]) for one in law.mean], [one[0] for one in law.cov])
-        for law in (found.posterior, found.predicted)
+        ([column(part[0]) for part in law.mean], [part[0] for part in law.cov])
+        for law in (laws.posterior, laws.predicted)
     )
     return system, y, u, z, p, lam, Psi
 
 
 def filtered(rng):
     system, y, u, z, p, lam, Psi = _run(rng)
-    K = [one @ system.H.T @ np.linalg.inv(system.R) for one in p]
+    K = [part @ system.H.T @ np.linalg.inv(system.R) for part in p]
     F = [np.linalg.solve(np.eye(2) - system.H @ gain, system.R) for gain in K]
     nu = [
         np.linalg.lstsq(gain, after - before, rcond=None)[0]
         for gain, after, before in zip(K, z, lam, strict=True)
     ]
-    rows = {"y": [column(one) for one in y], "u": [column(one) for one in u], "z": z, "p": p}
+    rows = {"y": [column(part) for part in y], "u": [column(part) for part in u], "z": z, "p": p}
     rows |= {r"\lambda": lam, r"\Psi": Psi, "K": K, "F": F, r"\nu": nu}
     fixed = {name: getattr(system, name) for name in "ABHQR"}
     fixed |= {"I": np.eye(4), "S": INTENSITY, r"\Delta": DELTA, "k": K_RANGE}

@@ -108,8 +108,8 @@ def _remembering(
     modes."""
     what = f"the logic-dynamic {name.upper()}"
     expect(model, JumpModel, what)
-    expect_each(structures, what)
     model.without_state(what)
+    expect_each(structures, what)
     if model.angles.x or model.angles.y:
         raise ModelError(f"{what} takes no components that are angles")
 
@@ -163,5 +163,5 @@ def _remembering(
 
 def _seen(y: Array, expected: Array, expectations: Sequence[Measurement]) -> Array:
     """The measurement; where it is missing what all modes together expect of it."""
-    h = sum(expected[:, j, None] * one.h for j, one in enumerate(expectations))
+    h = sum(expected[:, j, None] * measurement.h for j, measurement in enumerate(expectations))
     return expected_where_missing(y, expectations[0]._replace(h=np.asarray(h)), ())

@@ -42,14 +42,14 @@ def scalar(
     if isinstance(expression, sp.Inverse):
         return inverse(scalar(expression.arg, inverse))
     if isinstance(expression, sp.MatMul | sp.MatAdd):
-        parts = [scalar(one, inverse) for one in expression.args]
+        parts = [scalar(part, inverse) for part in expression.args]
         return sp.Mul(*parts) if isinstance(expression, sp.MatMul) else sp.Add(*parts)
     return expression
 
 
 _ARRAYS = {
-    scalar(one): name
-    for one, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))
+    scalar(part): name
+    for part, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))
 }
 
 
@@ -93,7 +93,7 @@ def in_numbers(
     ):
         taken = {state[0]: scalar(at)} | dict(zip(noises, exact_matrix(law.mean), strict=True))
         values[scalar(value)] = equation[0].subs(taken, simultaneous=True)
-    return [(scalar(one.lhs), scalar(one.rhs, inverse).xreplace(values)) for one in equations]
+    return [(scalar(part.lhs), scalar(part.rhs, inverse).xreplace(values)) for part in equations]
 
 
 def needed(rules: Sequence[Rule], wanted: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
