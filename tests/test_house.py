@@ -199,12 +199,12 @@ ROOMS = {
     "kfcourse/lab": 21_250,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_040,
-    "kfcourse/notebooks": 26_810,
+    "kfcourse/notebooks": 26_820,
     "kfcourse/pages": 10_140,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 24_270,
-    "tests": 229_470,
+    "tests": 229_480,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
