@@ -15,7 +15,7 @@ letters S, q        more letters that may be used
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -54,9 +54,7 @@ class Chain:
     links: list[Typed] = field(default_factory=list)
 
 
-def read_chains(
-    text: str, find: FindModel | None, setting: Setting | None = None
-) -> Iterator[Chain]:
+def read_chains(text: str, find: FindModel | None, setting: Setting | None = None) -> list[Chain]:
     """The chains of a text.
 
     Parameters
@@ -78,32 +76,28 @@ def read_chains(
         raise DerivationError(
             f"the derivation has {len(lines)} lines; at most {MOST_LINES} are checked: split it up"
         )
-    chain: Chain | None = None
+    chains, goes_on = list[Chain](), False
     for number, line in enumerate(lines, 1):
         line = line.partition("#")[0].rstrip()
         if not line.strip():
             continue
         if "=" not in line:
-            if chain is not None:
-                yield chain
-                chain = None
+            goes_on = False
             setting = _heading(line.strip(), number, setting, find)
             continue
         pieces = _pieces(line, number)
-        if pieces[0].text.strip():
-            if chain is not None:
-                yield chain
-            chain = Chain(setting)
-        elif chain is None:
+        if pieces[0].text:
+            chains.append(Chain(setting))
+            goes_on = True
+        elif not goes_on:
             raise DerivationError(
                 f"line {number}: {line.strip()[:60]!r} goes on, but nothing stands above it; "
                 f"begin with a name, as in F = ..."
             )
         else:
             pieces = pieces[1:]
-        chain.links += pieces
-    if chain is not None:
-        yield chain
+        chains[-1].links += pieces
+    return chains
 
 
 def _pieces(line: str, number: int) -> list[Typed]:

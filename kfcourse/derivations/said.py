@@ -88,7 +88,7 @@ def told(
 
 def _moment(slip: Slip) -> str:
     if slip.kind == "moment" and not slip.order:
-        return ": the mean of a function, or of its square, is not that of the mean"
+        return ": the mean of a function, a square or a product is not that of means"
     return f": it takes a moment of order {slip.order} for another one" if slip.order else ""
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import chain
-from math import gcd
+from math import gcd, prod
 from typing import Any
 
 import numpy as np
@@ -327,29 +327,39 @@ class _Search:
         """Wrong and right moments of the normal law, and their order; of functions, too."""
         law = self.setting.law
         at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
-        for _, call in [*walk(self.line), *walk(self.above)]:
-            if call.kind == CALL and call.data in ENTIRE and letters(call) & set(law.states):
-                square, there = mean(power(call, 2)), replaced(call, at_mean)
-                yield there, mean(call), 0
-                yield power(there, 2), square, 0
-                yield power(mean(call), 2), square, 0
+        for _, node in [*walk(self.line), *walk(self.above)]:
+            if node.kind == CALL and node.data in ENTIRE and letters(node) & set(law.states):
+                there = replaced(node, at_mean)
+                yield there, mean(node), 0
+                yield power(there, 2), mean(power(node, 2)), 0
+            factors = self._factors(node)
+            for i in range(1, len(factors)):
+                apart = (mean(product(*some)) for some in (factors[:i], factors[i:]))
+                yield product(*apart), mean(product(*factors)), 0
         for i, x in enumerate(law.states):
             m, d, moment = letter(law.means[i]), letter(law.cov[i][i]), mean(power(letter(x), 2))
             for k in range(2, 9):
-                raw, half = mean(power(letter(x), k)), Fraction(k, 2)
-                central = mean(power(difference(letter(x), m), k))
+                raw, central = (
+                    mean(power(one, k)) for one in (letter(x), difference(letter(x), m))
+                )
                 yield power(m, k), raw, k
                 if k % 2 == 0:
+                    square, own = (power(one, Fraction(k, 2)) for one in (moment, d))
                     yield central, raw, k
                     yield raw, central, k
-                if k in (4, 6, 8):
-                    yield power(moment, half), raw, k
-                    many = number({4: 3, 6: 15, 8: 105}[k])
-                    yield product(many, power(moment, half)), raw, k
-                    yield power(d, half), central, k
-                    yield power(d, half), raw, k
+                    yield product(number(prod(range(1, k, 2))), square), raw, k
+                    yield own, central, k
+                    yield own, raw, k
                 if k == 4:
                     yield raw, difference(raw, power(moment, 2)), k
+
+    def _factors(self, node: Node) -> list[Node]:
+        """Those that depend on the state, x^3 as three of them."""
+        if node.kind == PRODUCT:
+            return [one for part in node.parts for one in self._factors(part)]
+        if node.kind == POWER and node.data in range(2, 9):
+            return self._factors(node.parts[0]) * int(node.data)
+        return [node] * bool(letters(node) & set(self.setting.law.states))
 
     def _unlikely(self, slip: Slip) -> float:
         """An addition to the cost of changing a term that is nothing, or that stands in the line

@@ -162,12 +162,6 @@ class _Lines(Reader):
         while isinstance(inner, ast.BinOp) and isinstance(inner.op, operators):
             parts.append((1 if isinstance(inner.op, operators[0]) else -1, inner.right))
             inner = inner.left
-            if len(parts) > LONGEST:
-                raise self.fail(
-                    node,
-                    f"the line has more than {LONGEST} numbers, letters and signs; split the step "
-                    f"up",
-                )
         signs: list[int] = []
         trees: list[Node] = []
         minus = False
@@ -186,16 +180,19 @@ class _Lines(Reader):
         return Node(SUM, (found,), (-1,)) if minus else found
 
     def _power(self, node: ast.BinOp) -> Node:
-        exponent = _constant(self.read(node.right))
-        if exponent is None:
+        try:
+            exponent = Reader(self.formula, {}, self.offset).read(node.right)
+        except FormulaError:
+            exponent = sp.nan
+        if not exponent.is_Rational:
             raise self.fail(
                 node.right, "an exponent must be a plain number; write exp(...) for exponentials"
             )
-        if abs(exponent) > MAX_EXPONENT or exponent.denominator > MAX_EXPONENT:
+        if abs(exponent) > MAX_EXPONENT or exponent.q > MAX_EXPONENT:
             raise self.fail(
                 node.right, f"the exponent is larger than {MAX_EXPONENT}, or too fine a fraction"
             )
-        return power(self.read(node.left), exponent)
+        return power(self.read(node.left), Fraction(exponent.p, exponent.q))
 
     def _mean(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
         wanted = 2 if name == "Cov" else 1
@@ -212,28 +209,6 @@ class _Lines(Reader):
         if name == "D":
             return difference(mean(power(first, 2)), power(mean(first), 2))
         return difference(mean(product(first, second)), product(mean(first), mean(second)))
-
-
-def _constant(node: Node) -> Fraction | None:
-    """The value of an exponent made of numbers; None if it has letters."""
-    if node.kind == NUMBER:
-        return Fraction(node.data)
-    if node.kind not in (SUM, PRODUCT):
-        return None
-    parts = [_constant(part) for part in node.parts]
-    if None in parts or (
-        node.kind == PRODUCT
-        and any(e < 0 and not part for e, part in zip(node.data, parts, strict=True))
-    ):
-        return None
-    value = (
-        sum((s * p for s, p in zip(node.data, parts, strict=True)), Fraction(0))
-        if node.kind == SUM
-        else Fraction(1)
-    )
-    for e, part in zip(node.data, parts, strict=True) if node.kind == PRODUCT else ():
-        value *= part**e
-    return value
 
 
 def tree_of(formula: sp.Expr) -> Node:
