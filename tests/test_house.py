@@ -198,7 +198,7 @@ ROOMS = {
     "kfcourse/filters": 33_860,
     "kfcourse/lab": 21_250,
     "kfcourse/linear": 6_770,
-    "kfcourse/montecarlo": 11_040,
+    "kfcourse/montecarlo": 11_020,
     "kfcourse/notebooks": 26_820,
     "kfcourse/pages": 10_140,
     "kfcourse/records": 6_320,
