@@ -120,10 +120,10 @@ def _heading(line: str, number: int, setting: Setting, find: FindModel | None) -
         return (
             replace(setting, kind=line) if setting.model is None else of_model(setting.model, line)
         )
-    if found := re.fullmatch(r"x\s*~\s*N\s*\(\s*(\w+)\s*,\s*(\w+)\s*\)", line):
-        return setting.at(*(_name(one, number) for one in found.groups()))
+    if match := re.fullmatch(r"x\s*~\s*N\s*\(\s*(\w+)\s*,\s*(\w+)\s*\)", line):
+        return setting.at(*(_name(name, number) for name in match.groups()))
     if word in ("positive", "letters") and rest.strip():
-        names = frozenset(_name(one, number) for one in re.split(r"[\s,]+", rest.strip()))
+        names = frozenset(_name(name, number) for name in re.split(r"[\s,]+", rest.strip()))
         if word == "positive":
             return replace(setting, positive=setting.positive | names)
         return setting if setting.known is None else replace(setting, known=setting.known | names)

@@ -54,14 +54,14 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
         With the problem, the text and a pointer to the column.
     """
     pieces, columns, end = [], [], 0
-    for found in _OTHERWISE.finditer(text):
-        new = _IN_PYTHON[found[0]]
-        pieces += [text[end : found.start()], new]
+    for match in _OTHERWISE.finditer(text):
+        new = _IN_PYTHON[match[0]]
+        pieces += [text[end : match.start()], new]
         columns += [
-            *range(end, found.start()),
-            *(min(found.start() + i, found.end() - 1) for i in range(len(new))),
+            *range(end, match.start()),
+            *(min(match.start() + i, match.end() - 1) for i in range(len(new))),
         ]
-        end = found.end()
+        end = match.end()
     python, columns = "".join([*pieces, text[end:]]), [*columns, *range(end, len(text) + 1)]
     try:
         formula, tree, offset = syntax(python)
@@ -102,7 +102,7 @@ class _Lines(Reader):
         tree = replace(
             tree,
             span=place,
-            parts=tuple(one if one.span else replace(one, span=place) for one in tree.parts),
+            parts=tuple(part if part.span else replace(part, span=place) for part in tree.parts),
         )
         self.depth -= 1
         return tree
@@ -169,15 +169,14 @@ class _Lines(Reader):
             tree = self.read(part)
             # -a + b: the sign of a term, not a sum in a sum
             if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:
-                (own,), (one,) = tree.data, tree.parts
-                sign, tree = sign * own, one
+                sign, tree = sign * tree.data[0], tree.parts[0]
             # -a*b is -(a*b)
             elif kind == PRODUCT and not trees and tree.kind == SUM and len(tree.parts) == 1:
                 minus, tree = tree.data == (-1,), tree.parts[0]
             signs.append(sign)
             trees.append(tree)
-        found = Node(kind, tuple(trees), tuple(signs))
-        return Node(SUM, (found,), (-1,)) if minus else found
+        tree = Node(kind, tuple(trees), tuple(signs))
+        return Node(SUM, (tree,), (-1,)) if minus else tree
 
     def _power(self, node: ast.BinOp) -> Node:
         try:
@@ -203,7 +202,7 @@ class _Lines(Reader):
                 if wanted == 2
                 else f"{name} takes one expression: {name}[a]",
             )
-        first, second = (self.read(one) for one in (arguments[0], arguments[-1]))
+        first, second = (self.read(argument) for argument in (arguments[0], arguments[-1]))
         if name == "M":
             return Node(MEAN, (first,))
         if name == "D":
