@@ -192,7 +192,7 @@ ROOMS = {
     "book": 50_380,
     "exercises": 41_750,
     "kfcourse/*.py": 6_620,
-    "kfcourse/checks": 20_000,
+    "kfcourse/checks": 20_010,
     "kfcourse/continuous": 10_220,
     "kfcourse/derivations": 14_870,
     "kfcourse/filters": 33_860,
