@@ -182,9 +182,9 @@ def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:
     for letters in (False, True):  # of which there are many
         for name, source in sources.items():
             nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
-            names = sorted({piece.arg for piece in nodes if isinstance(piece, ast.arg)})
-            fixed = [piece.iter for piece in nodes if isinstance(piece, ast.For | ast.comprehension)]
-            left = {id(piece) for piece in fixed for piece in ast.walk(piece)}
+            names = sorted({node.arg for node in nodes if isinstance(node, ast.arg)})
+            fixed = [node.iter for node in nodes if isinstance(node, ast.For | ast.comprehension)]
+            left = {id(node) for loop in fixed for node in ast.walk(loop)}
             for place, node in enumerate(nodes):
                 if isinstance(node, ast.Name) is letters and id(node) not in left:
                     for number, (kind, _) in enumerate(changes(node, names)):
