@@ -243,7 +243,7 @@ def test_what_has_no_average_over_the_modes():
             average(model.modes[0])
     with pytest.raises(ValueError, match="a structure for each of the 2 modes, got 1"):
         averaged(model, structures[:1])
-    with pytest.raises(TypeError, match="list of structures, one a mode, and one came"):
+    with pytest.raises(TypeError, match="list of structures, one a mode, such as"):
         averaged(model, structures[0])
     with pytest.raises(TypeError, match="averaged expects a Structure, got Model"):
         averaged(model, model.modes)
