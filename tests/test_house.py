@@ -198,13 +198,13 @@ ROOMS = {
     "kfcourse/filters": 33_860,
     "kfcourse/lab": 21_250,
     "kfcourse/linear": 6_770,
-    "kfcourse/montecarlo": 11_060,
-    "kfcourse/notebooks": 26_810,
+    "kfcourse/montecarlo": 11_040,
+    "kfcourse/notebooks": 26_820,
     "kfcourse/pages": 10_140,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 24_270,
-    "tests": 229_460,
+    "tests": 229_480,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

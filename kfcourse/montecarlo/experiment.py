@@ -104,7 +104,9 @@ def measurements(one: Filter, y: Array) -> Array:
         y = y[:, None, None]
     if y.ndim != 3:
         raise ValueError(
-            f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}"
+            f"measurements must have the shape (steps, runs, {p}), got {y.shape}; of two axes give "
+            f"y[:, None, :] if the columns are components of one trajectory, y[:, :, None] if they "
+            f"are trajectories"
         )
     if y.shape[2] != p:
         raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
@@ -119,17 +121,6 @@ def measurements(one: Filter, y: Array) -> Array:
         )
     warn_of_degrees("a measurement", y, one.model.measured, one.model.angles.y)
     return y
-
-
-def _reshaped(y: Array, p: int) -> str:
-    """How measurements of two axes may be meant."""
-    if y.ndim != 2:
-        return ""
-    ways = (
-        ["y[:, None, :] if the columns are components of one trajectory"] if y.shape[1] == p else []
-    )
-    ways += ["y[:, :, None] if they are trajectories"] if p == 1 else []
-    return ": give " + " or ".join(ways) if ways else ""
 
 
 def compare(
@@ -383,12 +374,10 @@ def run_batches(
                     x = near(instant.x, state.posterior.mean, angles)
                     sums.record(i, k, x, state.posterior, weight, starts)
                     if scores is not None:
-                        for field, values in zip(
-                            (sums.log_score, sums.crps),
-                            scored(filters[i], scores, before[i], instant.y, state),
-                            strict=True,
-                        ):
-                            field[i, k] = np.add.reduceat(weight * values, starts)
+                        both = scored(filters[i], scores, before[i], instant.y, state)
+                        sums.log_score[i, k], sums.crps[i, k] = (
+                            np.add.reduceat(weight * values, starts) for values in both
+                        )
             if exact is None:
                 continue
             first, second, error = _twice(laws[exact])
@@ -463,12 +452,14 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
             f"its equations and parameters"
         )
     one = filters[int(np.argmin(finite[:, step]))]
-    words = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
-    if one.slow:
-        raise LeftOut(one.name, NotFinite(words, one.name, "infinite", step=step))
-    raise NotFinite(
-        f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step
+    reason = NotFinite(
+        f"step {step}: {one.name} became infinite or NaN although the trajectories are finite: the "
+        f"filter diverges, or its model is another",
+        one.name,
+        "infinite",
+        step=step,
     )
+    raise LeftOut(one.name, reason) if one.slow else reason
 
 
 def _progress(

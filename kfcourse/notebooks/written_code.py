@@ -4,7 +4,7 @@ differ from variant to variant."""
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,11 +157,10 @@ class Solutions:
                 entries = ", ".join(f"{cov_name}[{i}, {j}]" for i, j in upper)
                 lines.append(f"{', '.join(str(part.cov[i, j]) for i, j in upper)} = {entries}")
         if len(formulas) == 1:
-            lines += returned(python(*formulas.values()))
+            values = [folded(python(*formulas.values()))]
         else:
-            values = (folded(f"{python(formula)},  # {name}") for name, formula in formulas.items())
-            lines += ["return (", *("    " + line for value in values for line in value), ")"]
-        return "\n".join(lines)
+            values = [folded(f"{python(formula)},  # {name}") for name, formula in formulas.items()]
+        return "\n".join([*lines, *returned([line for value in values for line in value])])
 
 
 def _continued(line: str) -> list[str]:
@@ -169,20 +168,21 @@ def _continued(line: str) -> list[str]:
     line joins them."""
     if line.startswith("#") or len(line) <= COLUMNS:
         return [line]
-    lines = textwrap.wrap(
-        line, COLUMNS - 4, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
-    )
+    lines = _wrapped(line, COLUMNS - 4)
     return [f"{part} \\" for part in lines[:-1]] + lines[-1:]
 
 
-def returned(code: str) -> list[str]:
-    """A return statement, in brackets where it takes several lines."""
-    lines = folded(code)
-    return (
-        [f"return {code}"]
-        if len(lines) == 1
-        else ["return (", *("    " + line for line in lines), ")"]
+def _wrapped(text: str, columns: int) -> list[str]:
+    return textwrap.wrap(
+        text, columns, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
     )
+
+
+def returned(lines: Sequence[str]) -> list[str]:
+    """A return statement, in brackets where it takes several lines."""
+    if len(lines) == 1:
+        return [f"return {lines[0]}"]
+    return ["return (", *("    " + line for line in lines), ")"]
 
 
 def folded(code: str) -> list[str]:
@@ -191,10 +191,7 @@ def folded(code: str) -> list[str]:
     if len(code) <= COLUMNS:
         return [code]
     code, *comment = code.split("  # ")
-    lines = textwrap.wrap(
-        code, COLUMNS, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
-    )
-    return ["# " + name for name in comment] + lines
+    return ["# " + name for name in comment] + _wrapped(code, COLUMNS)
 
 
 def python(formula: Any) -> str:

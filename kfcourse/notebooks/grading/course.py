@@ -207,9 +207,7 @@ def _show(grades: Sequence[Grade]) -> None:
 def _signs() -> dict[str, str]:
     """Signs of the marks that this screen can show."""
     try:
-        "".join(SIGNS.values()).encode(getattr(sys.stdout, "encoding", None) or "ascii")
-    except (UnicodeEncodeError, LookupError):
-        return {
-            mark: {"✓": "+", "✗": "x", "–": "-"}.get(sign, sign) for mark, sign in SIGNS.items()
-        }
+        "".join(SIGNS.values()).encode(sys.stdout.encoding or "ascii")
+    except UnicodeEncodeError:
+        return dict(zip(SIGNS, "+xx--?", strict=True))
     return SIGNS
