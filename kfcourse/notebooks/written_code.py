@@ -104,7 +104,7 @@ class Solutions:
         model, known = self.exercise.model, (5,) if self.exercise.model.timed else ()
         cov = DEVIATIONS[:, None, None] ** 2 * np.eye(model.n)
         mean = np.tile(model.prior.mean, (len(cov), 1))
-        found = []
+        curves = []
         for place, (name, equation, functions, colour) in enumerate(
             (
                 (r"\Theta", "the state equation", "object_gaussian, object_linearised", "#0072B2"),
@@ -124,7 +124,7 @@ class Solutions:
                 (variances if variances.max() > SAME else most).argmax(), most.shape
             )
             index = "" if exact.shape[1:] == (1, 1) else f"_{{{row + 1}{column + 1}}}"
-            found.append(
+            curves.append(
                 Apart(
                     f"${name}{index}$",
                     equation,
@@ -135,7 +135,7 @@ class Solutions:
                     missing[:, row, column],
                 )
             )
-        return found
+        return curves
 
     def meter_is_silent(self) -> bool:
         """Whether the meter's noise, at the start and at the prior mean, leaves a combination of

@@ -134,7 +134,7 @@ def write_lines(grades: Iterable[Grade], path: Path) -> None:
 
 def write_table(grades: Iterable[Grade], path: Path) -> None:
     """Write a row for each grade as CSV that spreadsheets open, completely or not at all."""
-    questions = [f"q{i + 1}" for i in range(max(len(one.questions) for one in sets().values()))]
+    questions = [f"q{i + 1}" for i in range(max(len(set_.questions) for set_ in sets().values()))]
     columns = [
         "notebook",
         "status",
