@@ -1,0 +1,46 @@
+"""Meters with a noise that is solved for: the same filter as of the measurement transformed, which
+is linear in the noise."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from kfcourse import Model, ModelError, run, simulate
+from kfcourse.filters import pointmass
+from kfcourse.filters.densities import likelihood
+
+
+@pytest.mark.parametrize(
+    ("meter", "linear", "back"),
+    [
+        ("exp(x + 0.3*w)", "x + 0.3*w", np.log),
+        ("sinh(x + 0.3*w)", "x + 0.3*w", np.arcsinh),
+        ("(2 + tanh(x))*exp(0.3*w)", "log(2 + tanh(x)) + 0.3*w", np.log),
+    ],
+)
+def test_it_is_the_filter_of_the_transformed_measurement(meter, linear, back):
+    """Bayes' rule does not know in which units y is written: the factor |d omega/dy| is the same
+    for all states."""
+    curved, straight = (Model.define("0.9*x + 0.4*v", one) for one in (meter, linear))
+    _, y = simulate(curved, 10, 5, seed=1)
+    found, expected = run(pointmass(curved), y), run(pointmass(straight), back(y))
+    sigma = np.sqrt(expected.cov[..., 0, 0])
+    # twice the accuracy of a step
+    assert (np.abs(found.mean - expected.mean)[..., 0] < 2e-6 * sigma).all()
+    np.testing.assert_allclose(found.cov, expected.cov, rtol=4e-6)
+
+
+@pytest.mark.parametrize("meter", ["x + w**3", "x + w**2", "x + sin(w)", "exp(w*x) + w"])
+def test_what_cannot_be_solved_for_is_refused(meter):
+    model = Model.define("x + v", meter)
+    with pytest.raises(ModelError, match="noise enters nonlinearly"):
+        pointmass(model)
+
+
+def test_the_density_is_that_of_the_transformed_noise():
+    model = Model.define("x + v", "exp(x + 0.5*w)", meter_noise={"mean": 0.2, "variance": 4})
+    y, x = np.array([[0.3], [2.0], [-1.0], [np.nan]]), np.array([[0.1], [-0.4], [0.0], [0.0]])
+    expected = stats.lognorm(s=1.0, scale=np.exp(x[:2, 0] + 0.1)).logpdf(y[:2, 0])
+    np.testing.assert_allclose(likelihood(model)(y, x)[:2], expected, rtol=1e-12)
+    assert likelihood(model)(y, x)[2] == -np.inf  # no noise makes it negative
+    assert likelihood(model)(y, x)[3] == 0
