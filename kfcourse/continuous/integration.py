@@ -123,12 +123,14 @@ def at_rest(model: Model) -> Model:
     )
 
 
-def rates_of(model: Model, approximation: Callable[[Model], Structure]) -> Rates:
-    """The right sides as a function of arrays; of sigma points by the slopes of their
-    regression."""
+def rates_of(
+    model: Model, approximation: Callable[[Model], Structure], derived: MomentEquations | None
+) -> Rates:
+    """The right sides as a function of arrays; of sigma points, for which nothing is derived, by
+    the slopes of their regression."""
     n = model.n
-    if approximation in (gaussian, linearised):
-        z, p, *rates = moment_equations(model, approximation)
+    if derived is not None:
+        z, p, *rates = derived
         outputs = {
             name: part.subs(model.values)
             for name, part in zip(("drift", "A", "Q"), rates, strict=True)

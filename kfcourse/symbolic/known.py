@@ -101,11 +101,11 @@ class Known:
             return values[k]
         return float(k if name == "k" else self.interval * k)
 
-    def latex(self) -> list[str]:
-        """Lines of an `aligned` block: the time, and the first values of the inputs."""
+    def latex(self, time: str = "t") -> list[str]:
+        """Lines of an `aligned` block: the time of a step, and the first values of the inputs."""
         lines = (
-            [rf"t &= {sp.latex(self.interval * symbol('k'))}"]
-            if symbol("t") in self.symbols
+            [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"]
+            if symbol("t") in self.symbols and "t" not in self.inputs
             else []
         )
         for name, values in self.inputs.items():

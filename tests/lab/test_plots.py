@@ -122,8 +122,10 @@ def test_the_bands_are_confidence_intervals(results):
         low, high = result.gap(name).interval()
         np.testing.assert_allclose(band(ax, i), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
     assert len(ax.collections) == len(result.entrants) - 1  # the control is the axis
-    ax = plots.consistency(result, Figure().add_subplot(), ["duof"])
-    np.testing.assert_allclose(band(ax, 0), result.normalised_error("duof").interval(), rtol=1e-12)
+    ax = plots.consistency(result, Figure().add_subplot())
+    for i, name in enumerate(result.entrants):
+        interval = result.normalised_error(name).interval()
+        np.testing.assert_allclose(band(ax, i), interval, rtol=1e-12)
 
 
 def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
