@@ -43,7 +43,7 @@ pi_ij deceives by some per cent; the other components follow by regression on th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -193,7 +193,7 @@ def _one_law_a_mode(
         law, ahead = mixture(corrected, mu, angles), mixture(predicted, expected, angles)
         return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
 
-    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
+    return _with_evidence(Filter(name, model, init, step), structures)
 
 
 def gpb2(
@@ -245,7 +245,7 @@ def gpb2(
             Modes(mu, expected, predicted),
         )
 
-    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
+    return _with_evidence(Filter(name, model, init, step), structures)
 
 
 def _expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
@@ -266,9 +266,17 @@ def _corrected(
     return laws, *modes_given(memory.expected, expectations, y)
 
 
-def _evidence(structures: Sequence[Structure], before: State, y: Array, after: State) -> Array:
-    now = [structure.at(before.step) for structure in structures]
-    return modes_given(before.memory.expected, _expectations(now, before.memory), y)[1]
+def _with_evidence(one: Filter, structures: Sequence[Structure]) -> Filter:
+    """The filter with what it expects of measurements, a mixture."""
+
+    def expected(before: State) -> tuple[Array, list[Measurement]]:
+        now = [structure.at(before.step) for structure in structures]
+        return before.memory.expected, _expectations(now, before.memory)
+
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return modes_given(*expected(before), y)[1]
+
+    return replace(one, evidence=evidence, mixture=expected)
 
 
 def _where(holds: Array, law: Gaussian, other: Gaussian) -> Gaussian:
