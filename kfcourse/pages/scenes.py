@@ -173,7 +173,7 @@ def slip(
         ),
         value("potential", {"Delta": error}, potential, letters),
     ]
-    settings = {"noises": [rounded(one) for one in draws], "first": dict(first), "range": levels}
+    settings = {"noises": [rounded(draw) for draw in draws], "first": dict(first), "range": levels}
     return drawn(name, "A ball on the potential", "slip", parts, settings)
 
 
@@ -230,7 +230,7 @@ def leading(cells: dict[tuple[float, float], Comparison]) -> dict[str, Any]:
         gaps.append(
             [
                 {
-                    name: [round(100 * float(one[k]), 4) for one in parts]
+                    name: [round(100 * float(part[k]), 4) for part in parts]
                     for name, parts in of.items()
                 }
                 for k in steps
@@ -242,26 +242,26 @@ def leading(cells: dict[tuple[float, float], Comparison]) -> dict[str, Any]:
     return {"trajectories": exact, "ratios": ratios, "gaps": gaps, "leaders": leaders}
 
 
-def who_leads(name: str, found: Mapping[str, Any], first: tuple[int, float]) -> str:
+def who_leads(name: str, leaders: Mapping[str, Any], first: tuple[int, float]) -> str:
     """The order of filters over the step and a ratio of noises.
 
     Parameters
     ----------
     name : str
         Of the figure.
-    found : dict
+    leaders : dict
         As `leading` returns it.
     first : (int, float)
         Step and ratio shown first.
     """
-    looks = {one: {"label": title(one), **line_style(one)} for one in found["gaps"][0][0]}
+    looks = {name: {"label": title(name), **line_style(name)} for name in leaders["gaps"][0][0]}
     kinds = {look["colour"]: look["label"].lstrip("GL") for look in looks.values()}
     settings = {
-        **found,
+        **leaders,
         "looks": looks,
         "kinds": [
             {"label": label, "colour": colour, "width": 9} for colour, label in kinds.items()
         ],
-        "first": {"k": first[0], "ratio": found["ratios"].index(first[1])},
+        "first": {"k": first[0], "ratio": leaders["ratios"].index(first[1])},
     }
     return drawn(name, "Which filter is the most accurate", "who-leads", [], settings)

@@ -4,6 +4,7 @@ published figures."""
 import dataclasses
 import json
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -608,6 +609,14 @@ def test_stiff_equations_are_left_to_an_implicit_method():
     )
     with pytest.raises(NotFinite, match="stiff, and 100 trajectories"):
         gaussian(model).at(0).predict(np.zeros((100, 1)), np.ones((1, 1)))
+    # 100 steps of many trajectories tell that 30,000 would not do; a drift that explodes is none
+    begun = process_time()
+    with pytest.raises(NotFinite, match="stiff, and 20000 trajectories"):
+        gaussian(model).at(0).predict(np.zeros((20_000, 1)), np.ones((1, 1)))
+    assert process_time() - begun < 10
+    explodes = sampled("x**3 + x", "1", "x + w")
+    with pytest.raises(NotFinite, match="the moments become infinite"):
+        gaussian(explodes).at(0).predict(np.ones((100, 1)), np.ones((1, 1)))
 
 
 def test_many_trajectories_that_turn_fast_are_no_stiff_ones():
