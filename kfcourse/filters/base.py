@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -100,6 +100,9 @@ class Filter:
     look_back : LookBack, optional
         Where it is another than the normal law's by `structure`: what the whole record tells of
         each state.
+    mixture : callable, optional
+        Where what it expects of a measurement is a mixture of normal laws: the state before it to
+        their weights (runs, M), and the M expectations.
     """
 
     name: str
@@ -110,6 +113,7 @@ class Filter:
     structure: Structure | None = None
     evidence: Evidence | None = None
     look_back: LookBack | None = None
+    mixture: Callable[[State], tuple[Array, Sequence[Measurement]]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

@@ -43,7 +43,7 @@ pi_ij deceives by some per cent; the other components follow by regression on th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -185,7 +185,7 @@ def _one_law_a_mode(
         law, ahead = mixture(laws, mu, angles), mixture(predicted, expected, angles)
         return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
 
-    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
+    return _with_evidence(Filter(name, model, init, step), structures)
 
 
 def gpb2(
@@ -234,7 +234,7 @@ def gpb2(
             Modes(mu, expected, predicted),
         )
 
-    return Filter("gpb2", model, init, step, evidence=partial(_evidence, structures))
+    return _with_evidence(Filter("gpb2", model, init, step), structures)
 
 
 def expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
@@ -251,9 +251,17 @@ def corrected(
     return laws, modes_given(memory.expected, expected, y)[0]
 
 
-def _evidence(structures: Sequence[Structure], before: State, y: Array, after: State) -> Array:
-    now = [structure.at(before.step) for structure in structures]
-    return modes_given(before.memory.expected, expectations(now, before.memory), y)[1]
+def _with_evidence(filter_: Filter, structures: Sequence[Structure]) -> Filter:
+    """The filter with what it expects of measurements, a mixture."""
+
+    def expected(before: State) -> tuple[Array, list[Measurement]]:
+        now = [structure.at(before.step) for structure in structures]
+        return before.memory.expected, expectations(now, before.memory)
+
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return modes_given(*expected(before), y)[1]
+
+    return replace(filter_, evidence=evidence, mixture=expected)
 
 
 def _where(holds: Array, law: Gaussian, other: Gaussian) -> Gaussian:

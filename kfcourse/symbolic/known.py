@@ -95,10 +95,10 @@ class Known:
             return values[k]
         return float(k if name == "k" else self.interval * k)
 
-    def latex(self) -> list[str]:
-        """Lines of an `aligned` block: the time, and the first values of the inputs."""
-        time = [rf"t &= {sp.latex(self.interval * symbol('k'))}"]
-        lines = time if symbol("t") in self.symbols else []
+    def latex(self, time: str = "t") -> list[str]:
+        """Lines of an `aligned` block: the time of a step, and the first values of the inputs."""
+        clock = symbol("t") in self.symbols and "t" not in self.inputs
+        lines = [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"] if clock else []
         for name, values in self.inputs.items():
             letter, more = sp.latex(symbol(name)), [r"\ldots"] if len(values) > 6 else []
             listed = ", ".join([*(f"{value:g}" for value in values[:6]), *more])

@@ -304,13 +304,16 @@ class Model:
             for group in (self.x, self.v, self.w)
         )
         at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
-        state, moves = [sp.latex(x) for x in self.x], self.between is not None
+        state = [sp.latex(x) for x in self.x]
         meter = ["y"] if self.p == 1 else [f"y_{{{i + 1}}}" for i in range(self.p)]
-        lines = [
-            rf"{rf'd{name}/dt' if moves else with_index(name, 'k+1')} &= "
-            rf"{formula_latex(formula.xreplace(at_k), x, v)}"
-            for name, formula in zip(state, self.state_equation, strict=True)
-        ]
+        lines = (
+            [
+                rf"{with_index(name, 'k+1')} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+                for name, formula in zip(state, self.state_equation, strict=True)
+            ]
+            if self.between is None
+            else self.between.latex(self.x)
+        )
         lines += [
             rf"{with_index(name, 'k')} &= {formula_latex(formula.xreplace(at_k), x, w)}"
             for name, formula in zip(meter, self.meter_equation, strict=True)
@@ -323,7 +326,7 @@ class Model:
             lines += [
                 rf"{sp.latex(name)} &= {number_latex(float(value))}"
                 for name, value in self.values.items()
-            ] + self.known.latex()
+            ] + self.known.latex("t" if self.between is None else "t_{k}")
         return lines
 
     def __repr__(self) -> str:
