@@ -1,70 +1,13 @@
-"""Slow reference code, written straight from the lab's page for variant 53 and independent of the
-package.
-
-    x' = c x + e x v,   y = g x + f x^2 w,   x_0, v, w ~ N(0, 1),   c = 0.9, e = 0.05, g = 1, f = 0.02
-
-One trajectory at a time in plain floats for the filters without an ensemble; `np.mean`, `np.cov`
-and `np.linalg.pinv` for those whose coefficients are regressions over one.
-"""
+"""Slow reference code, written straight from the pages and independent of the package's
+computations."""
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 import numpy as np
 
 from kfcourse import Model
-
-C, E, G, F = 0.9, 0.05, 1.0, 0.02
-
-
-def tau(z, p):
-    return C * z
-
-
-def theta_linearised(z, p):
-    return C**2 * p + E**2 * z**2
-
-
-def theta_gaussian(z, p):
-    return C**2 * p + E**2 * z**2 + E**2 * p
-
-
-def h(m, d):
-    return G * m
-
-
-def f_linearised(m, d):
-    return G**2 * d + F**2 * m**4
-
-
-def f_gaussian(m, d):
-    return G**2 * d + F**2 * (m**4 + 6 * m**2 * d + 3 * d**2)
-
-
-STRUCTURES = {
-    "linearised": (theta_linearised, f_linearised),
-    "gaussian": (theta_gaussian, f_gaussian),
-}
-
-
-def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, float]]:
-    """(z_k, p_k) of the linearised or Gaussian AOF along one trajectory; a NaN measurement is
-    skipped."""
-    theta, f = STRUCTURES[kind]
-    lam, psi = 0.0, 1.0
-    found = []
-    for y in measurements:
-        if math.isnan(y):
-            z, p = lam, psi
-        else:
-            gain = psi * G / f(lam, psi)
-            z = lam + gain * (y - h(lam, psi))
-            p = psi - gain * G * psi
-        found.append((z, p))
-        lam, psi = tau(z, p), theta(z, p)
-    return found
 
 
 def regression(target, *regressors):

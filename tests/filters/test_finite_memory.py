@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from test_filters import LINEAR, OF_MEASUREMENTS, exact_ensemble
 
-from kfcourse.filters import fbp, fkp, fos, kalman_filter
+from kfcourse.filters import fbp, fkp, kalman_filter
 from kfcourse.filters.optimal_structure import Memory, Recipe, Remembered, of_structure
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
@@ -92,23 +91,3 @@ def test_angles_are_kept_together_where_estimates_are_remembered():
     # Turns draw the coefficients of the angle towards 1, where they nearly are; a jump would be an
     # error of 6 beside 0.04.
     assert np.sqrt((away**2).mean()) < 0.2 * np.sqrt(((unwrapped - x) ** 2).mean())
-
-
-def test_what_cannot_be_is_refused():
-    angular = linearised(Model.define("x + 0.1*v", "x + 0.1*w", angles={"x": ["x"], "y": []}))
-    with pytest.raises(
-        ModelError,
-        match=r"fkp4 regresses the state on measurements, and angles jump.*fbp\(structure, "
-        r"memory\)",
-    ):
-        fkp(angular)
-    assert fbp(angular, 2).name == "fbp2-linearised"
-    for memory in (0, -1, 2.5, True, "4"):
-        for family in (*OF_MEASUREMENTS, fbp):
-            with pytest.raises(
-                ValueError,
-                match=f"a memory holds so many steps, a positive whole number.*got {memory!r}",
-            ):
-                family(linearised(CURVED), memory)
-    with pytest.raises(ValueError, match="2 or 3 arguments, not 4"):
-        fos(linearised(CURVED), 4)

@@ -99,35 +99,6 @@ def test_the_exact_filter_is_the_sum_over_all_histories(model):
         assert abs(total[trajectory] - evidence) < 6e-3
 
 
-def test_missing_measurements_leave_the_exact_filter_as_predicted():
-    y = simulate(failing(), 2, 4, seed=1).y
-    one = pointmass(failing())
-    state = one.init(2)
-    for measured in y:
-        state = one.step(state, measured)
-    after = one.step(state, np.full((2, 1), np.nan))
-    np.testing.assert_allclose(after.memory.probability, state.memory.expected, atol=1e-9)
-    np.testing.assert_allclose(after.posterior.mean, state.predicted.mean, atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("model", "message"),
-    [
-        (
-            JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", modes={"a": {}}, transition=[1]),
-            "scalar models",
-        ),
-        (
-            JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]),
-            "no noise enters the meter",
-        ),
-    ],
-)
-def test_the_exact_filter_says_what_it_cannot_do(model, message):
-    with pytest.raises(ModelError, match=message):
-        pointmass(model)
-
-
 # --- filters of one law for each mode
 
 
@@ -309,32 +280,47 @@ def test_a_missing_measurement_is_remembered_as_what_all_modes_expect():
     np.testing.assert_allclose(state.posterior.mean[1], expected, rtol=1e-12)
 
 
-def test_the_fos_with_modes_says_what_it_cannot_do():
+def test_a_design_without_a_trajectory_in_a_mode_says_so():
     rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
     with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
         design(
-            [logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])],
+            [logic_dynamic_fos(rare, [gaussian(mode) for mode in rare.modes])],
             Ensemble(rare, 100, 3, seed=1),
         )
-    turning = JumpModel.define(
-        "x + v", "x + w", modes={"a": {}}, transition=[1], angles={"x": ["x"], "y": []}
-    )
-    for build, name in (
-        (logic_dynamic_fos, "FOS"),
-        (logic_dynamic_fkp, "FKP4"),
-        (logic_dynamic_fbp, "FBP4"),
-    ):
-        with pytest.raises(
-            ModelError, match=f"the logic-dynamic {name} takes no components that are angles"
-        ):
-            build(turning, [gaussian(turning.modes[0])])
-    for memory in (0, 2.5, True):
-        for build in (logic_dynamic_fkp, logic_dynamic_fbp):
-            with pytest.raises(
-                ValueError,
-                match=f"a memory holds so many steps, a positive whole number.*got {memory!r}",
-            ):
-                build(rare, [gaussian(one) for one in rare.modes], memory)
+
+
+ONE_MODE = {"modes": {"a": {}}, "transition": [1]}
+TURNING = JumpModel.define("x + v", "x + w", **ONE_MODE, angles={"x": ["x"], "y": []})
+PLANE = JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", **ONE_MODE)
+
+
+@pytest.mark.parametrize(
+    ("build", "model", "problem"),
+    [
+        (pointmass, PLANE, "scalar models"),
+        (pointmass, JumpModel.define("x + v", "x", **ONE_MODE), "no noise enters the meter"),
+        *(
+            (
+                lambda model, build=build: build(model, [gaussian(mode) for mode in model.modes]),
+                TURNING,
+                f"the logic-dynamic {name} takes no components that are angles",
+            )
+            for build, name in (
+                (logic_dynamic_fos, "FOS"),
+                (logic_dynamic_fkp, "FKP4"),
+                (logic_dynamic_fbp, "FBP4"),
+            )
+        ),
+        (
+            lambda model: averaged(model, [linearised(mode) for mode in model.modes]),
+            TURNING,
+            "angles have no average",
+        ),
+    ],
+)
+def test_models_that_a_filter_cannot_take_are_refused(build, model, problem):
+    with pytest.raises(ModelError, match=problem):
+        build(model)
 
 
 # --- the average over modes
@@ -363,16 +349,3 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     np.testing.assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)
     cross = (x[:, 0] - 0.7) * (x_next - x_next.mean())
     assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)
-
-
-def test_of_angles_there_is_no_average():
-    model = JumpModel.define(
-        "x + v",
-        "x + C*w",
-        {"C": 1},
-        modes={"a": {}, "b": {"parameters": {"C": 2}}},
-        transition=[0.5, 0.5],
-        angles={"x": ["x"], "y": []},
-    )
-    with pytest.raises(ModelError, match="angles have no average"):
-        averaged(model, [linearised(mode) for mode in model.modes])

@@ -135,40 +135,36 @@ def test_probabilities_sum_to_one_even_where_likelihoods_underflow():
 # --- bad input
 
 
+SCALAR = Model.define("x + v", "x + w")
+NAMED = Model.define(["r + s", "s + v1"], ["r + w1", "s + w2"], symbols={"x": ["r", "s"]})
+OTHER_PRIOR = Model.define(["x1 + x2", "x2 + v1"], ["x1 + w1", "x2 + w2"])
+TWO = [[0.9, 0.1], [0.1, 0.9]]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"structures": []}, "at least one structure"),
-        ({"transition": [[0.9, 0.1], [0.1, 0.9]]}, r"transition must have the shape \(3, 3\)"),
+        ({"transition": TWO}, r"transition must have the shape \(3, 3\)"),
         ({"transition": PI.T}, "sum to 1 in each row"),
         ({"transition": 2 * np.eye(3) - np.ones((3, 3)) / 3}, "must be probabilities"),
         ({"probabilities": [0.5, 0.5]}, r"probabilities must have the shape \(3,\)"),
         ({"probabilities": [0.5, 0.6, -0.1]}, "probabilities must be probabilities"),
         ({"probabilities": [np.nan, 0.5, 0.5]}, "probabilities must be probabilities"),
+        *(
+            ({"structures": [linearised(MODELS[0]), linearised(other)], "transition": TWO}, message)
+            for other, message in (
+                (SCALAR, "same state"),
+                (NAMED, "same state"),
+                (OTHER_PRIOR, "same prior"),
+            )
+        ),
     ],
 )
-def test_numbers_that_are_no_probabilities_are_refused(change, message):
-    good = {"structures": [linearised(m) for m in MODELS], "transition": PI, "probabilities": START}
+def test_what_does_not_fit_together_is_refused(change, message):
+    given = {"structures": [linearised(m) for m in MODELS], "transition": PI}
     with pytest.raises(ValueError, match=message):
-        imm(**(good | change))
-
-
-def test_models_that_do_not_fit_together_are_refused():
-    first = linearised(MODELS[0])
-    scalar = linearised(Model.define("x + v", "x + w"))
-    other_names = linearised(
-        Model.define(
-            ["r + s", "s + v1"], ["r + w1", "s + w2"], symbols={"x": ["r", "s"]}, prior=PRIOR
-        )
-    )
-    other_prior = linearised(Model.define(["x1 + x2", "x2 + v1"], ["x1 + w1", "x2 + w2"]))
-    for other, message in (
-        (scalar, "same state"),
-        (other_names, "same state"),
-        (other_prior, "same prior"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            imm([first, other], [[0.9, 0.1], [0.1, 0.9]])
+        imm(**(given | change))
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kfcourse import JumpModel, Model, ModelError, load_variants, run, simulate
+from kfcourse import JumpModel, Model, load_variants, run, simulate
 from kfcourse.filters import kalman_filter, particle
 from kfcourse.filters.densities import likelihood
 from kfcourse.lab import find_variant
@@ -170,19 +170,6 @@ def test_the_evidence_is_that_of_all_histories():
 
 
 # --- behaviour
-
-
-@pytest.mark.parametrize(
-    ("build", "problem"),
-    [
-        (lambda: particle(VARIANTS["2"], 1), "at least 2 particles, got 1"),
-        (lambda: particle(THROWN, 10.0), "at least 2 particles, got 10.0"),
-        (lambda: particle(Model.define("x + v", "x + w**2")), "noise enters nonlinearly"),
-    ],
-)
-def test_impossible_requests_are_refused(build, problem):
-    with pytest.raises(ModelError, match=problem):
-        build()
 
 
 def test_a_nonlinear_noise_of_the_object_is_admitted():
