@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kfcourse import JumpModel, Model, ModelError, linearised, simulate
-from kfcourse.symbolic.averaging import averaged, averaged_equations
+from kfcourse import JumpModel, Model, ModelError, simulate
+from kfcourse.symbolic.averaging import averaged_equations
 from kfcourse.symbolic.jumping import model_of_table
 
 pytestmark = pytest.mark.quick
@@ -106,13 +106,6 @@ def test_trajectories_follow_the_chain_and_the_mode_in_force():
         after = mode[1:][mode[:-1] == i]
         expected = model.transition_at(0)[i, 1]
         assert abs(after.mean() - expected) < 4 * np.sqrt(expected * (1 - expected) / len(after))
-
-
-def test_the_same_seed_gives_the_same_modes():
-    first, second = (simulate(define(), 50, 12, seed=3) for _ in range(2))
-    for one, other in zip(first, second, strict=True):
-        np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(simulate(define(), 50, 5, seed=3).mode, first.mode[:5])
 
 
 def test_averaged_equations():
@@ -230,19 +223,3 @@ def test_tables():
             model_of_table(plain | change)
     with pytest.raises(ModelError, match="no meter"):
         model_of_table({"state": "x + v", "modes": {"a": {}}, "transition": [1]})
-
-
-def test_what_has_no_average_over_the_modes():
-    model, circular = define(), define(angles={"x": ["x"], "y": []})
-    structures = [linearised(mode) for mode in model.modes]
-    for average in (averaged_equations, lambda given: averaged(given, structures)):
-        with pytest.raises(ModelError, match="components that are angles have no average"):
-            average(circular)
-        with pytest.raises(TypeError, match="expects a JumpModel"):
-            average(model.modes[0])
-    with pytest.raises(ValueError, match="a structure for each of the 2 modes, got 1"):
-        averaged(model, structures[:1])
-    with pytest.raises(TypeError, match="list of structures, one a mode, and one came"):
-        averaged(model, structures[0])
-    with pytest.raises(TypeError, match="averaged expects a Structure, got Model"):
-        averaged(model, model.modes)

@@ -258,53 +258,6 @@ def test_unscented_means_are_exact_for_quadratic_functions(kappa):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    "name", ["variant 53", "vector", "van der Pol", "parameters with an underscore too"]
-)
-def test_the_unexplained_part_is_what_sensitivity_leaves(kind, name):
-    model = MODELS[name]()
-    mean, cov = model.prior.mean[None], model.prior.cov[None]
-    structure = KINDS[kind](model)
-    _, G, F, R = structure.measure(mean, cov)
-    np.testing.assert_allclose(R + G @ cov @ np.swapaxes(G, -1, -2), F, rtol=1e-12)
-    (_, theta), (A, Q) = structure.predict(mean, cov), structure.transition(mean, cov)
-    np.testing.assert_allclose(Q + A @ cov @ np.swapaxes(A, -1, -2), theta, rtol=1e-12, atol=1e-15)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    ("state", "meter"),
-    [
-        ("0.9*x + v", "x + w"),
-        ("v", "x + w"),
-        ("1", "x + w"),
-        ("0.5", "2*x"),
-        ("x + v", "x*w"),
-        ("sqrt(sqrt(2))*x", "x*2**0.25 + w"),
-    ],
-)
-def test_results_broadcast_over_the_ensemble(kind, state, meter):
-    structure = KINDS[kind](Model.define(state, meter))
-    mean, cov = np.linspace(-1, 1, 7)[:, None], np.full((7, 1, 1), 0.5)
-    for one in (cov, cov[0]):
-        tau, theta = structure.predict(mean, one)
-        h, G, F = structure.measure(mean, one)[:3]
-        A, Q = structure.transition(mean, one)
-        square = (7, 1, 1)
-        for array, shape in (
-            (tau, (7, 1)),
-            (theta, square),
-            (A, square),
-            (Q, square),
-            (h, (7, 1)),
-            (G, square),
-            (F, square),
-        ):
-            assert np.broadcast_shapes(np.shape(array), shape) == shape
-            assert np.isfinite(array).all()
-
-
 def test_large_means_lose_no_digits():
     # Theta of x + x^2 v and F of x^2 + w at mean 1e6, variance 1e-10: closed forms, evaluated
     # exactly.
@@ -323,6 +276,12 @@ def test_large_means_lose_no_digits():
     found = structure.predict(np.array([[1e6]]), np.array([[[1e-10]]])).cov.item()
     # the phase 1e6 is known to 1e-10
     assert found == pytest.approx(float(theta.evalf(60)), rel=1e-9)
+    # Var exp(q x) = e^(2 q z + q^2 p) (e^(q^2 p) - 1), with q^2 p = 1e-22
+    q = sp.Rational(1, 10**6)
+    theta = sp.exp(2 * q * mean + q**2 * variance) * (sp.exp(q**2 * variance) - 1)
+    structure = gaussian(Model.define("exp(x/10**6) + 0*v", "x + w"))
+    found = structure.predict(np.array([[1e6]]), np.array([[[1e-10]]])).cov.item()
+    assert found == pytest.approx(float(theta.evalf(60)), rel=1e-12)
 
 
 def test_numerical_structures_have_no_formulas(variant53):
@@ -330,17 +289,6 @@ def test_numerical_structures_have_no_formulas(variant53):
         for ask in (lambda s: s["tau"], lambda s: s.latex(), lambda s: s.source()):
             with pytest.raises(NoClosedForm, match="quadrature"):
                 ask(KINDS[kind](variant53))
-
-
-@pytest.mark.parametrize(
-    "term",
-    ["tan(x)", "log(1 + x**2)", "sqrt(x)", "abs(x)", "atan(x)", "exp(-x**2)", "x/(1 + x**2)"],
-)
-def test_no_closed_form_leads_to_a_numerical_structure(term):
-    model = Model.define(f"0.5*x + {term} + v", "x + w", prior={"mean": 1, "variance": 0.01})
-    with pytest.raises(NoClosedForm, match=r"use linearised\(model\)"):
-        gaussian(model)
-    assert np.isfinite(unscented(model).predict(np.array([[1.0]]), np.array([[[0.01]]])).mean).all()
 
 
 def test_an_exponential_of_a_large_constant_is_not_torn_apart():
@@ -355,18 +303,6 @@ def test_an_exponential_of_a_large_constant_is_not_torn_apart():
     np.testing.assert_allclose(Theta, [[[slope**2 * p + 1]]], rtol=1e-12)
 
 
-def test_a_jump_cannot_be_linearised():
-    x, v, w = sp.symbols("x v w")
-    with pytest.raises(NoClosedForm, match="not differentiable"):
-        linearised(Model.define(sp.sign(x) + v, x + w))
-
-
-@pytest.mark.parametrize("order", [1, 0, -3])
-def test_gauss_hermite_needs_two_points(variant53, order):
-    with pytest.raises(ModelError, match="at least 2"):
-        gauss_hermite(variant53, order)
-
-
 def test_too_many_points_are_refused():
     noises = "+".join(f"sin(v{i})" for i in range(1, 10))
     with pytest.raises(ModelError, match="too many"):
@@ -379,7 +315,7 @@ def test_kappa_below_minus_the_dimension_is_refused(variant53):
             unscented(variant53, kappa)
 
 
-@pytest.mark.parametrize("order", [1, 5.0, True, "5"])
+@pytest.mark.parametrize("order", [1, -3, 5.0, True, "5"])
 def test_an_order_that_is_no_number_of_points_is_refused(variant53, order):
     with pytest.raises(ModelError, match="an order of at least 2"):
         gauss_hermite(variant53, order)
@@ -392,39 +328,6 @@ def test_the_source_that_runs_has_no_powers(variant53, kind):
         assert "def predict(" in code
         assert "def measure(" in code
         assert "**" not in code
-
-
-def test_latex_prints_all_five_functions(variant53):
-    text = gaussian(variant53).latex()
-    for left in (
-        r"\tau(z, p) &= c z",
-        r"\Theta(z, p) &=",
-        "h(m, d) &= g m",
-        "G(m, d) &= g",
-        "F(m, d) &=",
-    ):
-        assert left in text
-
-
-def test_latex_prints_every_entry_of_a_vector_model_and_symmetric_ones_once():
-    model = Model.define(["x1 + 2*x2", "x2 + v"], ["x1 + w1", "3*x2 + w2"])
-    lines = [line.rstrip("\\ ") for line in linearised(model).latex().splitlines()[1:-1]]
-    assert lines == [
-        r"\tau_{1}(z, p) &= z_{1} + 2 z_{2}",
-        r"\tau_{2}(z, p) &= z_{2}",
-        r"\Theta_{11}(z, p) &= p_{11} + 4 p_{12} + 4 p_{22}",
-        r"\Theta_{12}(z, p) &= p_{12} + 2 p_{22}",
-        r"\Theta_{22}(z, p) &= p_{22} + 1",
-        r"h_{1}(m, d) &= m_{1}",
-        r"h_{2}(m, d) &= 3 m_{2}",
-        r"G_{11}(m, d) &= 1",
-        r"G_{12}(m, d) &= 0",
-        r"G_{21}(m, d) &= 0",
-        r"G_{22}(m, d) &= 3",
-        r"F_{11}(m, d) &= d_{11} + 1",
-        r"F_{12}(m, d) &= 3 d_{12}",
-        r"F_{22}(m, d) &= 9 d_{22} + 1",
-    ]
 
 
 def test_the_noiseless_model_has_its_noises_at_their_means():
