@@ -19,7 +19,8 @@ from kfcourse.filters import (
 )
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees
-from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.ensemble import Ensemble, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.scenarios.navigation import Dynamics, Sensor, fuse, observe
 from kfcourse.symbolic.angular import AngleWarning
@@ -259,6 +260,15 @@ def test_errors_of_a_comparison_go_the_short_way():
         # Coefficients fitted over 2000 trajectories cost some parts in a thousand; a single lost
         # turn would cost 4 pi^2 / 2000 of an error variance of 0.03, two thirds of it.
         assert ratio.max() < 1.1, name
+
+
+def test_what_a_filter_remembers_of_a_measured_angle_is_its_innovation():
+    model = Model.define(
+        "x + 0.1*v", "x + 0.2*w", angles=["x", "y"], prior={"mean": 3.1, "variance": 0.01}
+    )
+    (one,) = design([fos(linearised(model), 3)], Ensemble(model, 100, 1, seed=1))
+    kept = one.step(one.init(3), np.array([[3.0], [-3.1], [np.nan]])).memory.measurements
+    np.testing.assert_allclose(kept[0].ravel(), [-0.1, 2 * PI - 6.2, 0], atol=1e-12)
 
 
 # ---------------------------------------------------------------- densities on the circle

@@ -70,12 +70,15 @@ def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each
 
 
 def test_trajectories_satisfy_the_equations_of_each_step():
-    """What is left of them are the noises, in their places and sizes: four standard errors."""
+    """What is left of them are the noises, in their places and sizes, independent of one another,
+    of the states and of those before: four standard errors."""
     one, runs = LINEAR["changing"], 4000
     x, y = simulate(one.model(), runs, STEPS, seed=1)
     _, (m_v, D_v), (m_w, D_w) = one.laws.values()
+    before = np.empty((0, runs))
     for k in range(STEPS - 1):
         A, B, a, H, C, b = one.at(k)
+        noises = []
         for left, M, mean, cov in (
             (x[k + 1] - x[k] @ A.T - a, B, m_v, D_v),
             (y[k] - x[k] @ H.T - b, C, m_w, D_w),
@@ -85,6 +88,12 @@ def test_trajectories_satisfy_the_equations_of_each_step():
             assert (
                 np.abs(np.cov(noise.T) - cov) < 4 * np.sqrt((np.outer(d, d) + cov**2) / runs)
             ).all()
+            noises.append(noise.T)
+        v, w = noises
+        for now, others in ((v, [w, x[k].T, before]), (w, [x[k].T, before])):
+            together = np.corrcoef(np.vstack([now, *others]))
+            assert np.abs(together[:2, 2:]).max() < 4 / np.sqrt(runs)
+        before = np.vstack(noises)
 
 
 def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
