@@ -32,6 +32,32 @@ def gaussian_mean(function, mean, cov, order: int = 40):
     return float(np.sum(weight.ravel() * function(list(points))))
 
 
+def steps_of(one, count):
+    """(A, constant, Q, H, constant, R) of the first steps of x' = A x + B v + a, y = H x + C w + b,
+    whose matrices `one.at` and laws `one.laws` tell: what the two references below take."""
+    _, (m_v, D_v), (m_w, D_w) = one.laws.values()
+    return [
+        (A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T)
+        for A, B, a, H, C, b in map(one.at, range(count))
+    ]
+
+
+def kalman_loop(steps, prior, y):
+    """Predicted and posterior law (mean, cov) at each step of one record y (N, p), NaN where
+    missing: the page's equations, with inverses.
+
+    `steps`: for each k (A, a, Q, H, b, R) of x' = A x + a + v, y = H x + b + w.
+    """
+    mean, cov = prior
+    for (A, a, Q, H, b, R), measured in zip(steps, y, strict=True):
+        predicted, seen = (mean, cov), ~np.isnan(measured)
+        H, R = H[seen], R[np.ix_(seen, seen)]
+        K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + R)
+        mean, cov = mean + K @ (measured - b)[seen] - K @ H @ mean, cov - K @ H @ cov
+        yield predicted, (mean, cov)
+        mean, cov = A @ mean + a, A @ cov @ A.T + Q
+
+
 def joint_posterior(steps, prior, y):
     """Means (N, n), covariances (N, n, n) of a linear model's states given a record, and its log
     density, by one regression.
@@ -88,13 +114,7 @@ class Changing:
         return A, np.array([[1 + t, 0.0], [1.0, 0.5]]), np.array([u, -2 * u]), H, C, b
 
     def steps(self, count: int):
-        """A, constant, Q, H, constant, R of each step, as `joint_posterior` takes them."""
-        _, (m_v, D_v), (m_w, D_w) = self.laws.values()
-        each = map(self.at, range(count))
-        return [
-            (A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T)
-            for A, B, a, H, C, b in each
-        ]
+        return steps_of(self, count)
 
     def model(self) -> Model:
         state = [

@@ -53,20 +53,11 @@ def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each
     one = LINEAR[name]
     y = simulate(one.model(), 4, STEPS, seed=3).y
     found = run(kalman_filter(one.model()), y)
-    (mean, P), (m_v, D_v), (m_w, D_w) = one.laws.values()
-    x = np.tile(mean, (4, 1))
-    for k in range(STEPS):
-        A, B, a, H, C, b = one.at(k)
-        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + C @ D_w @ C.T)
-        x, P = x + (y[k] - x @ H.T - C @ m_w - b) @ K.T, P - K @ H @ P
-        np.testing.assert_allclose(found.mean[k], x, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(
-            np.broadcast_to(found.cov[k], (4, *P.shape)),
-            np.tile(P, (4, 1, 1)),
-            rtol=1e-9,
-            atol=1e-9,
-        )
-        x, P = x @ A.T + B @ m_v + a, A @ P @ A.T + B @ D_v @ B.T
+    for i in range(4):
+        loop = oracles.kalman_loop(oracles.steps_of(one, STEPS), one.laws["prior"], y[:, i])
+        for k, (_, (mean, cov)) in enumerate(loop):
+            np.testing.assert_allclose(found.mean[k, i], mean, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(found.cov[k, i], cov, rtol=1e-9, atol=1e-9)
 
 
 def test_trajectories_satisfy_the_equations_of_each_step():

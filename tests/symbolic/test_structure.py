@@ -151,42 +151,39 @@ def quadrature(model, equation, law):
     return means, covs, cross @ np.linalg.inv(model.prior.cov)
 
 
+def parts(structure, mean, cov):
+    """Value, covariance, sensitivity, and what that leaves unexplained: of both equations."""
+    h, G, F, R = structure.measure(mean, cov)
+    return (
+        (*structure.predict(mean, cov), *structure.transition(mean, cov)),
+        (h, F, G, R),
+    )
+
+
+def sides(model):
+    """Both equations: symbolic, and as a function; and the law of their noise."""
+    state, meter = compile_model(model)
+    return (
+        (model.state_equation, state, model.state_noise),
+        (model.meter_equation, meter, model.meter_noise),
+    )
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_gaussian_functions_are_what_quadrature_finds(name):
+    """Ten points an axis integrate exponentials and sines of these variances to 1e-9; Stein:
+    dtau/dz = Cov(a, x) P^-1, dh/dm = Cov(b, x) P^-1."""
     model = MODELS[name]()
-    structure = gaussian(model)
-    mean, cov = model.prior.mean[None], model.prior.cov[None]
-    tau, theta = structure.predict(mean, cov)
-    # Ten points an axis integrate exponentials and sines of these variances to 1e-9.
-    expected_tau, expected_theta, expected_A = quadrature(
-        model, model.state_equation, model.state_noise
-    )
-    np.testing.assert_allclose(
-        np.broadcast_to(tau, (1, model.n))[0], expected_tau, rtol=1e-8, atol=1e-9
-    )
-    np.testing.assert_allclose(
-        np.broadcast_to(theta, (1, model.n, model.n))[0], expected_theta, rtol=1e-8, atol=1e-9
-    )
-    # Stein: dtau/dz = Cov(a, x) P^-1, dh/dm = Cov(b, x) P^-1
-    np.testing.assert_allclose(
-        np.broadcast_to(structure.transition(mean, cov).A, (1, model.n, model.n))[0],
-        expected_A,
-        rtol=1e-8,
-        atol=1e-9,
-    )
-    found = structure.measure(mean, cov)
-    h, F, G = quadrature(model, model.meter_equation, model.meter_noise)
-    for array, expected in zip(found[:3], (h, G, F), strict=True):
-        np.testing.assert_allclose(
-            np.broadcast_to(array, (1, *expected.shape))[0], expected, rtol=1e-8, atol=1e-9
-        )
+    found = parts(gaussian(model), *model.prior)
+    for (equation, _, noise), ours in zip(sides(model), found, strict=True):
+        for part, expected in zip(ours, quadrature(model, equation, noise), strict=False):
+            np.testing.assert_allclose(part, expected, rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_linearised_functions_are_values_and_difference_quotients(name):
     model = MODELS[name]()
-    state, meter = compile_model(model)
-    x, v, w = model.prior.mean, model.state_noise.mean, model.meter_noise.mean
+    x, P = model.prior
     step = 1e-5  # central differences err by step^2 |f'''| + 1e-16 / step, below 1e-9 here
 
     def slopes(function, at):
@@ -198,64 +195,41 @@ def test_linearised_functions_are_values_and_difference_quotients(name):
             axis=-1,
         )
 
-    structure = linearised(model)
-    tau, theta = structure.predict(x, model.prior.cov)
-    A, B = slopes(lambda t: state(t, v), x), slopes(lambda t: state(x, t), v)
-    np.testing.assert_allclose(tau, state(x, v), rtol=1e-13)
-    np.testing.assert_allclose(
-        theta, A @ model.prior.cov @ A.T + B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8
-    )
-    following = structure.transition(x, model.prior.cov)
-    np.testing.assert_allclose(following.A, A, rtol=1e-7, atol=1e-8)
-    np.testing.assert_allclose(following.Q, B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8)
-    h, G, F = structure.measure(x, model.prior.cov)[:3]
-    H, C = slopes(lambda t: meter(t, w), x), slopes(lambda t: meter(x, t), w)
-    np.testing.assert_allclose(h, meter(x, w), rtol=1e-13)
-    np.testing.assert_allclose(G, H, rtol=1e-7, atol=1e-8)
-    np.testing.assert_allclose(
-        F, H @ model.prior.cov @ H.T + C @ model.meter_noise.cov @ C.T, rtol=1e-7, atol=1e-8
-    )
+    found = parts(linearised(model), x, P)
+    for (_, function, (m, D)), ours in zip(sides(model), found, strict=True):
+        value, spread, slope, unexplained = ours
+        A = slopes(lambda at, of=function, m=m: of(at, m), x)
+        B = slopes(lambda at, of=function: of(x, at), m)
+        np.testing.assert_allclose(value, function(x, m), rtol=1e-13)
+        np.testing.assert_allclose(slope, A, rtol=1e-7, atol=1e-8)
+        np.testing.assert_allclose(unexplained, B @ D @ B.T, rtol=1e-7, atol=1e-8)
+        np.testing.assert_allclose(spread, A @ P @ A.T + B @ D @ B.T, rtol=1e-7, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["variant 53", "vector", "van der Pol"])
 def test_gauss_hermite_is_exact_for_polynomials(name):
     model = MODELS[name]()
-    mean, cov = (
+    law = (
         np.stack([model.prior.mean, model.prior.mean + 0.3]),
         np.stack([model.prior.cov, 2 * model.prior.cov]),
     )
-    exact, numerical = gaussian(model), gauss_hermite(model, 4)
     # degree 3 at most, so squares of degree 6 < 2 * 4; rounding of some hundred summands
     for found, expected in zip(
-        (
-            *numerical.predict(mean, cov),
-            *numerical.measure(mean, cov),
-            *numerical.transition(mean, cov),
-        ),
-        (*exact.predict(mean, cov), *exact.measure(mean, cov), *exact.transition(mean, cov)),
-        strict=True,
+        parts(gauss_hermite(model, 4), *law), parts(gaussian(model), *law), strict=True
     ):
-        np.testing.assert_allclose(
-            found, np.broadcast_to(expected, found.shape), rtol=1e-11, atol=1e-11
-        )
+        for ours, exact in zip(found, expected, strict=True):
+            np.testing.assert_allclose(*np.broadcast_arrays(ours, exact), rtol=1e-11, atol=1e-11)
 
 
 @pytest.mark.parametrize("kappa", [None, 0.5, 2.0])
 def test_unscented_means_are_exact_for_quadratic_functions(kappa):
     model = vector_model()
-    mean, cov = model.prior.mean[None], model.prior.cov[None]
-    exact, numerical = gaussian(model), unscented(model, kappa)
-    np.testing.assert_allclose(
-        numerical.predict(mean, cov).mean, exact.predict(mean, cov).mean, rtol=1e-12
-    )
-    np.testing.assert_allclose(
-        numerical.measure(mean, cov).h, exact.measure(mean, cov).h, rtol=1e-12
-    )
-    np.testing.assert_allclose(
-        numerical.measure(mean, cov).G,
-        np.broadcast_to(exact.measure(mean, cov).G, (1, 2, 2)),
-        rtol=1e-12,
-    )
+    numerical, exact = unscented(model, kappa), gaussian(model)
+    for found, expected in zip(
+        parts(numerical, *model.prior), parts(exact, *model.prior), strict=True
+    ):
+        np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
+        np.testing.assert_allclose(found[2], expected[2], rtol=1e-12)
 
 
 def test_large_means_lose_no_digits():
