@@ -24,7 +24,7 @@ from kfcourse import (
     simulate,
     unscented,
 )
-from kfcourse.filters import aof, fbp, fkp, fos, kalman_filter, pointmass
+from kfcourse.filters import aof, kalman_filter, pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
@@ -160,32 +160,12 @@ def test_a_chain_that_changes_with_time():
 # --- the FOS with modes
 
 
-# Each filter with modes, the one that it is without, and what both remember of (y_k, y_k-1, ...),
-# (z_k, z_k-1, ...).
+# What each remembers of (y_k, y_k-1, ...), (z_k, z_k-1, ...).
 REMEMBERING = {
-    "fos": (logic_dynamic_fos, fos, (0, 1)),
-    "fkp": (partial(logic_dynamic_fkp, memory=3), partial(fkp, memory=3), (3, 0)),
-    "fbp": (partial(logic_dynamic_fbp, memory=3), partial(fbp, memory=3), (0, 3)),
+    "fos": (logic_dynamic_fos, (0, 1)),
+    "fkp": (partial(logic_dynamic_fkp, memory=3), (3, 0)),
+    "fbp": (partial(logic_dynamic_fbp, memory=3), (0, 3)),
 }
-OF_EACH = pytest.mark.parametrize("family", REMEMBERING)
-
-
-@OF_EACH
-@pytest.mark.parametrize("kind", [gaussian, linearised])
-def test_one_mode_is_the_filter_without_modes_bit_for_bit(family, kind):
-    with_modes, without, _ = REMEMBERING[family]
-    model = JumpModel.define(
-        "x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w", modes={"only": {}}, transition=[1]
-    )
-    plain = model.modes[0]
-    y = simulate(plain, 20, 8, seed=4).y
-    y[3, 0] = y[5, :] = np.nan
-    (found,), (expected,) = (
-        design([one], Ensemble(plain, 2000, 8, seed=1))
-        for one in (with_modes(model, [kind(plain)]), without(kind(plain)))
-    )
-    np.testing.assert_array_equal(run(found, y).mean, run(expected, y).mean)
-    np.testing.assert_array_equal(run(found, y).cov, run(expected, y).cov)
 
 
 def in_each_mode(block, modes):
@@ -214,11 +194,11 @@ def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
     np.testing.assert_allclose(run(found, y).cov, expected.cov, rtol=1e-8, atol=1e-8)
 
 
-@OF_EACH
+@pytest.mark.parametrize("family", REMEMBERING)
 def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family):
     """The note's equations by hand: regressions and normal laws over the trajectories of each mode,
     for a scalar sensor."""
-    with_modes, _, (measurements, estimates) = REMEMBERING[family]
+    with_modes, (measurements, estimates) = REMEMBERING[family]
     model, runs, steps = failing(), 500, 6
     blocks = list(Ensemble(model, runs, steps, seed=3))
     (one,) = design([with_modes(model, [gaussian(mode) for mode in model.modes])], blocks)
@@ -338,14 +318,15 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     structure = averaged(CURVED, [gaussian(mode) for mode in CURVED.modes]).at(k)
     tau, theta = structure.predict(mean, cov)
     h, G, F, R = structure.measure(mean, cov)
-    for sample, first, second in ((x_next, tau, theta), (y, h, F)):
-        assert abs(sample.mean() - first.item()) < 4 * sample.std() / np.sqrt(size)
-        square = (sample - sample.mean()) ** 2
-        assert abs(square.mean() - second.item()) < 4 * square.std() / np.sqrt(size)
-    cross = (x[:, 0] - 0.7) * (y - y.mean())
-    assert abs(cross.mean() - 0.5 * G.item()) < 4 * cross.std() / np.sqrt(size)
-    np.testing.assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
     A, Q = structure.transition(mean, cov)
+
+    def is_mean(expected, sample):
+        assert abs(sample.mean() - expected.item()) < 4 * sample.std() / np.sqrt(size)
+
+    for sample, first, second, slope in ((x_next, tau, theta, A), (y, h, F, G)):
+        away = sample - sample.mean()
+        is_mean(first, sample)
+        is_mean(second, away**2)
+        is_mean(0.5 * slope, (x[:, 0] - 0.7) * away)
+    np.testing.assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
     np.testing.assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)
-    cross = (x[:, 0] - 0.7) * (x_next - x_next.mean())
-    assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)

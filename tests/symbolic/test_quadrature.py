@@ -36,44 +36,6 @@ def test_the_pendulum_has_its_published_errors(structure, published):
 # --- what does not vary
 
 
-def ungm(time_is_a_state):
-    x, noise = (["x1/2 + 25*x1/(1 + x1**2) + 8*cos(1.2*x2) + v1", "x2 + 1"], "x1**2/20 + w1")
-    if time_is_a_state:
-        return Model.define(
-            x, noise, prior={"mean": [0, 0], "variance": [5.0, 0.0]}, state_noise={"variance": 10}
-        )
-    return Model.define(
-        "x/2 + 25*x/(1 + x**2) + v",
-        "x**2/20 + w",
-        prior={"variance": 5},
-        state_noise={"variance": 10},
-    )
-
-
-@pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
-@pytest.mark.parametrize("kind", [lambda m: unscented(m), lambda m: gauss_hermite(m, 6)])
-def test_time_as_a_state_changes_nothing(kind):
-    """The growth model: the filter of the scalar model, moved by 8 cos 1.2 k from outside, is the
-    same to rounding."""
-    model, scalar = ungm(True), kind(ungm(False))
-    y = simulate(model, 20, 40, seed=1).y
-    found = run(aof(kind(model)), y)
-    assert not found.cov[..., 1, :].any()  # time has no variance, not even one of rounding
-    one, state = aof(scalar), aof(scalar).init(20)
-    for k in range(40):
-        state = one.step(state, y[k])
-        # errors of rounding grow where the filter doubts between x and -x: to some 1e-9 in these 40
-        # steps
-        np.testing.assert_allclose(found.mean[k, :, :1], state.posterior.mean, rtol=1e-7, atol=1e-7)
-        np.testing.assert_allclose(
-            found.cov[k, :, :1, :1], state.posterior.cov, rtol=1e-7, atol=1e-7
-        )
-        predicted = state.predicted
-        state = state._replace(
-            predicted=predicted._replace(mean=predicted.mean + 8 * np.cos(1.2 * k))
-        )
-
-
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
 def test_a_known_state_has_no_part_in_the_unexplained(kind):
     model = Model.define(
