@@ -97,41 +97,69 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior)
 # --- against other integrations of the same equation
 
 
-def on_a_uniform_grid(y, a, q, b, r, mean, variance, half_width, nodes=2001):
-    """The Stratonovich equation with rectangles: a(x), b(x) and sigmas q, r(x) of both noises;
-    means and sigmas (steps,).
-
-    The narrowest density here spans more than ten nodes per sigma: rectangles then err by exp(-2
-    pi^2 10^2), that is not at all.
-    """
-    x = np.linspace(-half_width, half_width, nodes)
-    kernel = normal(x[:, None], a(x), q)
-    density, found = normal(x, mean, np.sqrt(variance)), []
-    for value in y:
-        density = density * normal(value, b(x), r(x))
-        density /= density.sum()
-        centre = density @ x
-        found.append((centre, np.sqrt(density @ (x - centre) ** 2)))
+def on_points(model, y, x, move, spread, see, noise):
+    """Means and deviations, (2, steps, runs), of x' = move(x) + spread(x) v, y = see(x) + noise(x) w:
+    the Stratonovich equation by sums over points at equal distances."""
+    kernel = normal(x[:, None], move(x), spread(x))
+    density, found = normal(x, model.prior.mean, np.sqrt(model.prior.cov[0]))[:, None], []
+    for measured in y[:, :, 0]:
+        density = density * normal(measured, see(x)[:, None], noise(x)[:, None])
+        density /= density.sum(axis=0)
+        mean = x @ density
+        found.append((mean, np.sqrt(x**2 @ density - mean**2)))
         density = kernel @ density
-    return np.array(found).T
+    return np.moveaxis(found, 1, 0)
 
 
-DENSE = {
-    "5": (lambda x: 0.95 * x, 0.2, np.sin, lambda x: 0.3, 1.0, 9.0),
-    "7": (lambda x: 0.9 * x, 0.3, lambda x: x, lambda x: 0.3 * (1 + x**2), 1.0, 9.0),
-    "11": (lambda x: x + 0.1 * (x - x**3), 0.15, lambda x: x, lambda x: 0.5, 0.3, 5.0),
+def always(value):
+    return lambda x: np.full_like(x, value)
+
+
+def same(x):
+    return x
+
+
+SMOOTH = {  # of variants: object, its noise; meter, its noise
+    "5": (lambda x: 0.95 * x, always(0.2), np.sin, always(0.3)),
+    "7": (lambda x: 0.9 * x, always(0.3), same, lambda x: 0.3 * (1 + x**2)),
+    "11": (lambda x: x + 0.1 * (x - x**3), always(0.15), same, always(0.5)),
 }
 
 
-@pytest.mark.parametrize("name", DENSE)
+@pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("accuracy", [1e-3, ACCURACY])
 def test_it_equals_a_dense_uniform_grid(variants, name, accuracy):
-    a, q, b, r, variance, half_width = DENSE[name]
-    _, y = simulate(variants[name], 5, 10, seed=8)
-    expected = [
-        on_a_uniform_grid(y[:, i, 0], a, q, b, r, 0.0, variance, half_width) for i in range(5)
-    ]
-    agrees(followed(variants[name], y, accuracy), *np.moveaxis(expected, 0, -1))
+    """The narrowest density here spans more than ten nodes per sigma: the sums then err by exp(-2
+    pi^2 10^2), that is not at all."""
+    y = simulate(variants[name], 5, 10, seed=8).y
+    expected = on_points(variants[name], y, np.linspace(-9, 9, 2001), *SMOOTH[name])
+    agrees(followed(variants[name], y, accuracy), *expected)
+
+
+JUMPING = {
+    # dry friction
+    "x - 0.5*sign(x) + v": (lambda x: x - 0.5 * np.sign(x), always(1), same, always(1)),
+    "0.8*x + 3*sign(x) + v": (lambda x: 0.8 * x + 3 * np.sign(x), always(1), same, always(1)),
+    "Heaviside(x) + v": (lambda x: np.heaviside(x, 0.5), always(1), same, always(1)),
+    "0.9*x + (1 if x < 0 else 2)*v": (
+        lambda x: 0.9 * x,
+        lambda x: np.where(x < 0, 1.0, 2.0),
+        same,
+        always(1),
+    ),
+    "0.9*x + v": (lambda x: 0.9 * x, always(1), lambda x: 2 * np.sign(x), always(1)),
+}
+
+
+@pytest.mark.parametrize("state", JUMPING)
+def test_panels_are_split_where_the_object_or_the_meter_jumps(state):
+    """Midpoints of cells 1/50 of the meter's deviation wide, none of which holds the jump at 0, err
+    by some 1e-5; across a jump they would by 1e-2."""
+    meter = "2*sign(x) + w" if state == "0.9*x + v" else "x + w"
+    model = Model.define(state, meter, prior={"mean": 0.5, "variance": 2.0})
+    y = simulate(model, 12, 5, seed=1).y
+    expected = on_points(model, y, np.arange(-40, 40, 0.02) + 0.01, *JUMPING[state])
+    agrees(followed(model, y, 1e-3), *expected, allowed=1e-4)
 
 
 @pytest.mark.parametrize("f", [0.02, 0.2])
@@ -260,52 +288,6 @@ def test_a_kernel_that_is_narrow_here_and_folds_there():
     sd = np.sqrt((weight * (after - mean) ** 2).sum() / weight.sum())
     found = [part[1:] for part in followed(model, np.array([[[0.4]], [[1.3]]]))]
     agrees(found, mean, sd)
-
-
-BEYOND = 40.0  # the states of the oracles below lie within
-
-
-def by_midpoints(y, prior, mean, deviation, meter):
-    """Means and deviations of p(x_k | y_0..k), y = b(x) + w, by midpoints of cells none of which
-    holds the jump at 0."""
-    x = np.arange(-BEYOND, BEYOND, 0.02) + 0.01
-    kernel = np.exp(-0.5 * ((x[:, None] - mean(x)) / deviation(x)) ** 2) / deviation(x)
-    ahead = np.exp(-0.5 * (x - prior.mean) ** 2 / prior.cov[0, 0])[:, None]
-    for measured in y[:, :, 0]:
-        p = ahead * np.exp(-0.5 * (measured - meter(x[:, None])) ** 2)
-        p /= p.sum(axis=0)
-        found = x @ p
-        yield found, np.sqrt(x**2 @ p - found**2)
-        ahead = kernel @ p
-
-
-ONE = np.ones_like
-
-
-@pytest.mark.parametrize(
-    ("state", "meter", "mean", "deviation", "b"),
-    [
-        # dry friction
-        ("x - 0.5*sign(x) + v", "x + w", lambda x: x - 0.5 * np.sign(x), ONE, lambda x: x),
-        ("0.8*x + 3*sign(x) + v", "x + w", lambda x: 0.8 * x + 3 * np.sign(x), ONE, lambda x: x),
-        ("Heaviside(x) + v", "x + w", lambda x: np.heaviside(x, 0.5), ONE, lambda x: x),
-        (
-            "0.9*x + (1 if x < 0 else 2)*v",
-            "x + w",
-            lambda x: 0.9 * x,
-            lambda x: np.where(x < 0, 1.0, 2.0),
-            lambda x: x,
-        ),
-        ("0.9*x + v", "2*sign(x) + w", lambda x: 0.9 * x, ONE, lambda x: 2 * np.sign(x)),
-    ],
-)
-def test_panels_are_split_where_the_object_or_the_meter_jumps(state, meter, mean, deviation, b):
-    """A midpoint rule of cells 1/50 of the meter's deviation wide errs by some 1e-5; across a jump
-    it would by 1e-2."""
-    model = Model.define(state, meter, prior={"mean": 0.5, "variance": 2.0})
-    _, y = simulate(model, 12, 5, seed=1)
-    expected = np.array(list(by_midpoints(y, model.prior, mean, deviation, b)))
-    agrees(followed(model, y, 1e-3), *np.moveaxis(expected, 1, 0), allowed=1e-4)
 
 
 def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():

@@ -53,12 +53,8 @@ RUNS, STEPS, SEED = 6000, 4, 5
 @pytest.fixture(scope="module")
 def direct(linear):
     """The comparison, and errors and covariances of each trajectory kept beside it."""
-    wrong = Model.define(
-        list(linear.state_equation),
-        list(linear.meter_equation),
-        prior={"variance": 9},
-        symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
-    )
+    one = Gaussian(np.zeros(2), np.eye(2))
+    wrong = replace(linear, prior=Gaussian(np.zeros(2), 9 * np.eye(2)), meter_noise=one)
     filters = [aof(gaussian(linear)), duof(linear), replace(kalman_filter(wrong), name="wrong")]
     result = compare(filters, linear, RUNS, STEPS, SEED, same_ensemble=True, progress=False)
     x, y = stored(linear, RUNS, STEPS, SEED)
