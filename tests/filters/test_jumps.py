@@ -64,9 +64,13 @@ AFFINE = JumpModel.define(
     transition=[[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]],
     first=[0.5, 0.3, 0.2],
 )
-TWO_CHAINS = JumpModel.define(
-    "x + v", "x + w", modes={"one": {}, "other": {}}, transition=LASTING, first=FIRST
-)
+ONE_MODE = {"modes": {"a": {}}, "transition": [1]}
+CHAINS = {
+    1: JumpModel.define("x + v", "x + w", **ONE_MODE),
+    2: JumpModel.define(
+        "x + v", "x + w", modes={"a": {}, "b": {}}, transition=LASTING, first=FIRST
+    ),
+}
 CURVED = JumpModel.define(
     "x - 0.4*sin(x) + s*v",
     "g*x + 0.3*x**2 + f*(1 + x**2)*w",
@@ -174,20 +178,21 @@ def in_each_mode(block, modes):
     return Instant(*(np.concatenate([one] * modes) for one in block[:3]), mode, mode)
 
 
+@pytest.mark.parametrize("modes", CHAINS)
 @pytest.mark.parametrize("family", ["fos", "fkp", "fbp"])
-def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
+def test_without_jumps_a_linear_model_has_its_kalman_filter(family, modes):
     """With moments that are exact, and a memory that holds all there is; rounding as for the
     filters without modes."""
     one, steps = LINEAR["n=2, p=2"], 5
     plain = one.model()
-    model = replace(TWO_CHAINS, modes=(plain, plain))
+    model = replace(CHAINS[modes], modes=(plain,) * modes)
     build = {
         "fos": logic_dynamic_fos,
         "fkp": partial(logic_dynamic_fkp, memory=steps),
         "fbp": logic_dynamic_fbp,
     }[family]
-    moments = [in_each_mode(moment, 2) for moment in exact_ensemble(one, steps, seed=3)]
-    (found,) = design([build(model, [gaussian(plain)] * 2)], moments)
+    moments = [in_each_mode(moment, modes) for moment in exact_ensemble(one, steps, seed=3)]
+    (found,) = design([build(model, [gaussian(plain)] * modes)], moments)
     y = simulate(plain, 4, steps, seed=8).y
     expected = run(kalman_filter(plain), y)
     np.testing.assert_allclose(run(found, y).mean, expected.mean, rtol=1e-8, atol=1e-8)
@@ -269,7 +274,6 @@ def test_a_design_without_a_trajectory_in_a_mode_says_so():
         )
 
 
-ONE_MODE = {"modes": {"a": {}}, "transition": [1]}
 TURNING = JumpModel.define("x + v", "x + w", **ONE_MODE, angles={"x": ["x"], "y": []})
 PLANE = JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", **ONE_MODE)
 

@@ -277,22 +277,25 @@ def test_an_exponential_of_a_large_constant_is_not_torn_apart():
     np.testing.assert_allclose(Theta, [[[slope**2 * p + 1]]], rtol=1e-12)
 
 
-def test_too_many_points_are_refused():
-    noises = "+".join(f"sin(v{i})" for i in range(1, 10))
-    with pytest.raises(ModelError, match="too many"):
-        gauss_hermite(Model.define(f"x*({noises})", "x + w"))
-
-
-def test_kappa_below_minus_the_dimension_is_refused(variant53):
-    for kappa in (-2, float("nan"), float("inf")):
-        with pytest.raises(ModelError, match="kappa"):
-            unscented(variant53, kappa)
-
-
-@pytest.mark.parametrize("order", [1, -3, 5.0, True, "5"])
-def test_an_order_that_is_no_number_of_points_is_refused(variant53, order):
-    with pytest.raises(ModelError, match="an order of at least 2"):
-        gauss_hermite(variant53, order)
+@pytest.mark.parametrize(
+    ("build", "problem"),
+    [
+        (
+            lambda _: gauss_hermite(
+                Model.define("x*(" + "+".join(f"sin(v{i + 1})" for i in range(9)) + ")", "x + w")
+            ),
+            "too many",
+        ),
+        *((lambda model, k=k: unscented(model, k), "kappa") for k in (-2, np.nan, np.inf)),
+        *(
+            (lambda model, n=n: gauss_hermite(model, n), "an order of at least 2")
+            for n in (1, -3, 5.0, True, "5")
+        ),
+    ],
+)
+def test_what_is_no_rule_of_points_is_refused(variant53, build, problem):
+    with pytest.raises(ModelError, match=problem):
+        build(variant53)
 
 
 @pytest.mark.parametrize("kind", TABLE)
