@@ -19,17 +19,26 @@ def regression(target, *regressors):
     return matrix, offset, joint[0, 0] - matrix @ joint[1:, 0]
 
 
-def gaussian_mean(function, mean, cov, order: int = 40):
-    """M[function(x)], x ~ N(mean, cov), by a Gauss-Hermite product rule; function takes a list of
-    components."""
-    mean, cov = np.asarray(mean, dtype=float), np.asarray(cov, dtype=float)
+def gaussian_points(mean, cov, order: int = 40):
+    """Points (N, n) and weights (N,) of a Gauss-Hermite product rule for N(mean, cov)."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)
     grids = np.meshgrid(*[nodes] * len(mean), indexing="ij")
-    weight = np.ones_like(grids[0])
-    for w in np.meshgrid(*[weights / weights.sum()] * len(mean), indexing="ij"):
-        weight = weight * w
-    points = mean[:, None] + np.linalg.cholesky(cov) @ np.stack([g.ravel() for g in grids])
-    return float(np.sum(weight.ravel() * function(list(points))))
+    each = np.meshgrid(*[weights / weights.sum()] * len(mean), indexing="ij")
+    standard = np.stack([grid.ravel() for grid in grids], axis=-1)
+    return mean + standard @ np.linalg.cholesky(cov).T, np.prod(each, axis=0).ravel()
+
+
+def gaussian_mean(function, mean, cov):
+    """M[function(x)], x ~ N(mean, cov); function takes a list of components."""
+    points, weights = gaussian_points(np.array(mean), np.array(cov))
+    return float(weights @ function(list(points.T)))
+
+
+def mixture(weights, laws):
+    """Mean and covariance of a mixture of laws (mean, cov)."""
+    mean = sum(w * m for w, (m, _) in zip(weights, laws, strict=True))
+    spread = (P + np.outer(m - mean, m - mean) for m, P in laws)
+    return mean, sum(w * P for w, P in zip(weights, spread, strict=True))
 
 
 def steps_of(one, count):

@@ -1,11 +1,9 @@
 """The iterated filter: Gauss and Newton's method, and the printed equations at the tangent and with
 sigma points."""
 
-import re
-
 import numpy as np
 import pytest
-import sympy as sp
+from test_filters import Interpreter
 
 from kfcourse.filters import notation as s
 from kfcourse.filters.iterated_ekf import EQUATIONS, iterated
@@ -30,57 +28,30 @@ def ranges() -> Model:
     )
 
 
-# ---------------------------------------------------------------- linearised: Gauss-Newton
-
-
-def measured(model, runs, seed):
-    """First measurements (1, runs, 2)."""
-    return simulate(model, runs, 1, seed=seed).y
-
-
-# ---------------------------------------------------------------- moments: posterior linearisation
+# a place z^(i) with its covariance, the next, and the structural functions there
+Z, P = s.matrix(r"z^{(i)}", s.n, s.ONE), s.matrix(r"p^{(i)}", s.n, s.n)
+Z_NEXT, P_NEXT = s.matrix(r"z^{(i+1)}", s.n, s.ONE), s.matrix(r"p^{(i+1)}", s.n, s.n)
+THERE = [
+    s.matrix(rf"{letter}(z^{{(i)}}, p^{{(i)}})", *shape)
+    for letter, shape in (("h", (s.p, s.ONE)), ("G", (s.p, s.n)), ("F", (s.p, s.p)))
+]
 
 
 @pytest.mark.parametrize("build", [linearised, unscented])
 def test_the_printed_equations_are_the_filter(ranges, build):
     """Gauss and Newton's method at the tangent, iterated posterior linearisation with sigma
     points."""
-    y, rounds = measured(ranges, 1, seed=8), 3
-    structure = build(ranges)
-    values = {s.y: y[0, 0][:, None], s.lam: PRIOR_MEAN[:, None], s.Psi: PRIOR_COV}
-    z_i, P_i = (symbol(name) for name in (r"z^{(i)}", r"p^{(i)}"))
-    values |= {z_i: values[s.lam], P_i: values[s.Psi]}
+    y, rounds, structure = simulate(ranges, 3, 1, seed=8).y, 3, build(ranges)
+    prior = {s.lam: np.tile(PRIOR_MEAN[:, None], (3, 1, 1)), s.Psi: np.tile(PRIOR_COV, (3, 1, 1))}
+    z, p = prior.values()
     for _ in range(rounds):
-        measurement = structure.measure(values[z_i][:, 0], values[P_i])
-        values |= {
-            symbol("h("): measurement.h[:, None],
-            symbol("G("): measurement.G,
-            symbol("F("): measurement.F,
-        }
-        for equation in EQUATIONS:
-            arguments = sorted(equation.rhs.atoms(sp.MatrixSymbol), key=str)
-            dummies = [
-                sp.MatrixSymbol(f"M{j}", *argument.shape) for j, argument in enumerate(arguments)
-            ]
-            function = sp.lambdify(
-                dummies, equation.rhs.xreplace(dict(zip(arguments, dummies, strict=True))), "numpy"
-            )
-            values[equation.lhs] = function(*(values[argument] for argument in arguments))
-        values |= {z_i: values[symbol(r"z^{(i+1)}")], P_i: values[symbol(r"p^{(i+1)}")]}
+        h, G, F, _ = structure.measure(z[..., 0], p)
+        values = prior | {s.y: y[0][..., None], Z: z, P: p}
+        for symbol, value in zip(THERE, (h[..., None], G, F), strict=True):
+            values[symbol] = np.broadcast_to(value, (3, *value.shape[-2:]))
+        printed = Interpreter(values, {}).execute(EQUATIONS)
+        z, p = printed[Z_NEXT], printed[P_NEXT]
     found = run(iterated(structure, rounds), y)
     # the printed forms lose a few digits where the meter is sharper than the prior
-    np.testing.assert_allclose(found.mean[0, 0], values[z_i][:, 0], rtol=1e-10)
-    np.testing.assert_allclose(found.cov[0, 0], values[P_i], rtol=1e-9, atol=1e-12)
-
-
-def symbol(start):
-    """The symbol of the printed equations whose LaTeX starts so."""
-    every = set().union(
-        *(q.lhs.atoms(sp.MatrixSymbol) | q.rhs.atoms(sp.MatrixSymbol) for q in EQUATIONS)
-    )
-    (one,) = [q for q in every if re.sub(r"^\{(.*)\}$", r"\1", q.name).startswith(start)]
-    return one
-
-
-# ---------------------------------------------------------------- missing measurements, shapes,
-# errors
+    np.testing.assert_allclose(found.mean[0], z[..., 0], rtol=1e-10)
+    np.testing.assert_allclose(found.cov[0], p, rtol=1e-9, atol=1e-12)

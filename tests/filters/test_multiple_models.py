@@ -1,9 +1,9 @@
 """The interacting-multiple-model filter against a slow loop."""
 
-import math
-
 import numpy as np
+import oracles
 import pytest
+from scipy.stats import multivariate_normal
 
 from kfcourse import JumpModel, Model, linearised, run, simulate
 from kfcourse.filters import gpb2, logic_dynamic
@@ -52,64 +52,40 @@ def follow(one, y):
 # --- independent references
 
 
-def slow_imm(y, systems, pi, start, mean, cov):
-    """Blom and Bar-Shalom's algorithm for one trajectory, straight from the page: loops, and
-    inverses of numbers."""
-    modes = len(systems)
-    c = list(start)
-    predicted = [(np.array(mean), np.array(cov)) for _ in range(modes)]
-    found = []
-    for measurement in y:
-        kept = [i for i, value in enumerate(measurement) if not math.isnan(value)]
-        corrected, likelihood = [], []
-        for (_, H, _, R), (x, P) in zip(systems, predicted, strict=True):
-            if kept:
-                h, r = H[kept], R[np.ix_(kept, kept)]
-                nu, S = measurement[kept] - h @ x, h @ P @ h.T + r
-                K = P @ h.T @ np.linalg.inv(S)
-                corrected.append((x + K @ nu, P - K @ S @ K.T))
-                exponent = -0.5 * nu @ np.linalg.inv(S) @ nu
-                likelihood.append(
-                    math.exp(exponent) / math.sqrt((2 * math.pi) ** len(kept) * np.linalg.det(S))
-                )
-            else:
-                corrected.append((x, P))
-                likelihood.append(1.0)
-        total = sum(c[j] * likelihood[j] for j in range(modes))
-        mu = [c[j] * likelihood[j] / total for j in range(modes)]
-        z = sum(mu[j] * corrected[j][0] for j in range(modes))
-        p = sum(
-            mu[j] * (corrected[j][1] + np.outer(corrected[j][0] - z, corrected[j][0] - z))
-            for j in range(modes)
-        )
-        found.append((z, p, np.array(mu)))
-        c = [sum(pi[i][j] * mu[i] for i in range(modes)) for j in range(modes)]
-        predicted = []
-        for j, (A, _, Q, _) in enumerate(systems):
-            weight = [pi[i][j] * mu[i] / c[j] for i in range(modes)]
-            x = sum(weight[i] * corrected[i][0] for i in range(modes))
-            P = sum(
-                weight[i] * (corrected[i][1] + np.outer(corrected[i][0] - x, corrected[i][0] - x))
-                for i in range(modes)
-            )
-            predicted.append((A @ x, A @ P @ A.T + Q))
+def slow_imm(y, systems, pi, start, prior):
+    """Blom and Bar-Shalom's algorithm for one trajectory, straight from the page; `systems`: (A, a,
+    Q, H, b, R) of each mode."""
+    c, predicted, found = start, [prior] * len(systems), []
+    for measured in y:
+        seen, corrected, likelihood = ~np.isnan(measured), [], []
+        for system, law in zip(systems, predicted, strict=True):
+            ((_, posterior),) = oracles.kalman_loop([system], law, [measured])
+            corrected.append(posterior)
+            H, R = system[3][seen], system[5][np.ix_(seen, seen)]
+            expected = multivariate_normal(H @ law[0], H @ law[1] @ H.T + R) if seen.any() else None
+            likelihood.append(expected.pdf(measured[seen]) if expected else 1.0)
+        mu = c * likelihood / (c @ likelihood)
+        found.append((*oracles.mixture(mu, corrected), mu))
+        c = mu @ pi
+        mixed = [oracles.mixture(mu * pi[:, j] / c[j], corrected) for j in range(len(systems))]
+        predicted = [
+            (A @ x, A @ P @ A.T + Q) for (A, _, Q, *_), (x, P) in zip(systems, mixed, strict=True)
+        ]
     return found
 
 
 def matrices(m):
-    system, _, _ = linear_system(m)
-    return system.A, system.H, system.Q, system.R
+    system, a, b = linear_system(m)
+    return system.A, a, system.Q, system.H, b, system.R
 
 
 @pytest.mark.parametrize("gaps", [False, True])
 def test_against_a_slow_loop(gaps):
     y = data(gaps=gaps)
     mean, cov, probability, *_ = follow(imm([linearised(m) for m in MODELS], PI, START), y)
-    law = MODELS[0].prior
+    systems = [matrices(m) for m in MODELS]
     for trajectory in range(y.shape[1]):
-        expected = slow_imm(
-            y[:, trajectory], [matrices(m) for m in MODELS], PI, START, law.mean, law.cov
-        )
+        expected = slow_imm(y[:, trajectory], systems, PI, START, MODELS[0].prior)
         for k, (z, p, mu) in enumerate(expected):
             np.testing.assert_allclose(mean[k, trajectory], z, rtol=0, atol=ROUNDING)
             np.testing.assert_allclose(cov[k, trajectory], p, rtol=0, atol=ROUNDING)

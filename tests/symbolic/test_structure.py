@@ -3,6 +3,7 @@
 import numpy as np
 import oracles
 import pytest
+import scipy
 import sympy as sp
 
 from kfcourse.symbolic.equations import compile_model, compile_noiseless
@@ -121,34 +122,17 @@ MODELS = {
 def quadrature(model, equation, law):
     """Mean, covariance, and sensitivity Cov(., x) P^-1 of an equation at the prior, with 10 points
     an axis."""
-    mean = np.concatenate([model.prior.mean, law.mean])
-    n, size = model.n, len(mean)
-    cov = np.zeros((size, size))
-    cov[:n, :n], cov[n:, n:] = model.prior.cov, law.cov
+    n, mean = model.n, np.concatenate([model.prior.mean, law.mean])
+    points, weights = oracles.gaussian_points(
+        mean, scipy.linalg.block_diag(model.prior.cov, law.cov), 10 if len(mean) < 5 else 6
+    )
     symbols = [*model.x, *(model.v if law is model.state_noise else model.w)]
     rows = [sp.lambdify(symbols, formula.subs(model.values)) for formula in equation]
-    order = 10 if size < 5 else 6
-
-    def moment(function):
-        return oracles.gaussian_mean(
-            lambda points: function(points) + 0 * points[0], mean, cov, order
-        )
-
-    means = np.array([moment(lambda t, row=row: row(*t)) for row in rows])
-    deviations = [
-        lambda t, row=row, centre=centre: row(*t) - centre
-        for row, centre in zip(rows, means, strict=True)
-    ]
-    covs = np.array(
-        [[moment(lambda t, r=r, q=q: r(t) * q(t)) for q in deviations] for r in deviations]
-    )
-    cross = np.array(
-        [
-            [moment(lambda t, row=row, j=j: row(*t) * (t[j] - mean[j])) for j in range(n)]
-            for row in rows
-        ]
-    )
-    return means, covs, cross @ np.linalg.inv(model.prior.cov)
+    values = np.stack([row(*points.T) + 0 * weights for row in rows])
+    centre = values @ weights
+    away = (values - centre[:, None]) * weights
+    cross = away @ (points - mean)[:, :n]
+    return centre, away @ (values - centre[:, None]).T, cross @ np.linalg.inv(model.prior.cov)
 
 
 def parts(structure, mean, cov):
