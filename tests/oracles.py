@@ -19,6 +19,13 @@ def regression(target, *regressors):
     return matrix, offset, joint[0, 0] - matrix @ joint[1:, 0]
 
 
+def is_mean(expected, sample):
+    """The sample's mean is the expected one, within four of its own standard errors: one chance in
+    16,000."""
+    sample = np.asarray(sample, dtype=float)
+    assert abs(sample.mean() - expected) < 4 * sample.std() / np.sqrt(sample.size)
+
+
 def gaussian_points(mean, cov, order: int = 40):
     """Points (N, n) and weights (N,) of a Gauss-Hermite product rule for N(mean, cov)."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)
