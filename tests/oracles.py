@@ -26,6 +26,15 @@ def is_mean(expected, sample):
     assert abs(sample.mean() - expected) < 4 * sample.std() / np.sqrt(sample.size)
 
 
+def has_moments(sample, mean, cov):
+    """Whether draws (N, n) have this mean and covariance, as `is_mean` asks."""
+    away = sample - mean
+    for i in range(len(cov)):
+        is_mean(mean[i], sample[:, i])
+        for j in range(i + 1):
+            is_mean(cov[i, j], away[:, i] * away[:, j])
+
+
 def gaussian_points(mean, cov, order: int = 40):
     """Points (N, n) and weights (N,) of a Gauss-Hermite product rule for N(mean, cov)."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)

@@ -108,24 +108,12 @@ def test_dynamics_says_what_is_wrong(arguments, message):
 
 
 def test_paths_have_the_moments_of_the_dynamics():
-    runs, times = 40_000, np.array([0.5, 0.8, 2.3])
-    path = sample(FREE, PRIOR, times, runs, seed=3)
-    step = FREE.over(1.8)
-    mean, cov = step.A @ PRIOR.mean, step.A @ PRIOR.cov @ step.A.T + step.Q
-    last = path.states[-1]
-    # four standard errors: of a mean, sqrt(c_ii / N); of a covariance, sqrt((c_ii c_jj + c_ij^2) /
-    # N)
-    assert (np.abs(last.mean(axis=0) - mean) < 4 * np.sqrt(np.diag(cov) / runs)).all()
-    bound = 4 * np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / runs)
-    assert (np.abs(np.cov(last.T) - cov) < bound).all()
-    # ... and jointly: x(2.3) on x(0.8) has the slope exp(A 1.5)
-    slope, residual, *_ = np.linalg.lstsq(
-        path.states[1] - path.states[1].mean(0), last - last.mean(0)
-    )
-    errors = np.sqrt(
-        np.outer(np.diag(np.linalg.inv(np.cov(path.states[1].T))), residual / runs) / runs
-    )
-    assert (np.abs(slope - FREE.over(1.5).A.T) < 4 * errors).all()
+    """At two moments, and jointly: x(2.3) = exp(1.5 A) x(0.8) and what is independent of it."""
+    path = sample(FREE, PRIOR, np.array([0.5, 0.8, 2.3]), 40_000, seed=3)
+    first, then = FREE.over(0.3), FREE.over(1.5)
+    mean, cov = first.A @ PRIOR.mean, first.A @ PRIOR.cov @ first.A.T + first.Q
+    joint = np.block([[cov, cov @ then.A.T], [then.A @ cov, then.A @ cov @ then.A.T + then.Q]])
+    oracles.has_moments(np.hstack(path.states[1:]), np.hstack([mean, then.A @ mean]), joint)
 
 
 @pytest.mark.parametrize("times", [[], [0.0, 0.0], [1.0, 0.5], [0.0, np.nan]])
