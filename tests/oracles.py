@@ -1,70 +1,13 @@
-"""Slow reference code, written straight from the lab's page for variant 53 and independent of the
-package.
-
-    x' = c x + e x v,   y = g x + f x^2 w,   x_0, v, w ~ N(0, 1),   c = 0.9, e = 0.05, g = 1, f = 0.02
-
-One trajectory at a time in plain floats for the filters without an ensemble; `np.mean`, `np.cov`
-and `np.linalg.pinv` for those whose coefficients are regressions over one.
-"""
+"""Slow reference code, written straight from the pages and independent of the package's
+computations."""
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 import numpy as np
 
 from kfcourse import Model
-
-C, E, G, F = 0.9, 0.05, 1.0, 0.02
-
-
-def tau(z, p):
-    return C * z
-
-
-def theta_linearised(z, p):
-    return C**2 * p + E**2 * z**2
-
-
-def theta_gaussian(z, p):
-    return C**2 * p + E**2 * z**2 + E**2 * p
-
-
-def h(m, d):
-    return G * m
-
-
-def f_linearised(m, d):
-    return G**2 * d + F**2 * m**4
-
-
-def f_gaussian(m, d):
-    return G**2 * d + F**2 * (m**4 + 6 * m**2 * d + 3 * d**2)
-
-
-STRUCTURES = {
-    "linearised": (theta_linearised, f_linearised),
-    "gaussian": (theta_gaussian, f_gaussian),
-}
-
-
-def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, float]]:
-    """(z_k, p_k) of the linearised or Gaussian AOF along one trajectory; a NaN measurement is
-    skipped."""
-    theta, f = STRUCTURES[kind]
-    lam, psi = 0.0, 1.0
-    found = []
-    for y in measurements:
-        if math.isnan(y):
-            z, p = lam, psi
-        else:
-            gain = psi * G / f(lam, psi)
-            z = lam + gain * (y - h(lam, psi))
-            p = psi - gain * G * psi
-        found.append((z, p))
-        lam, psi = tau(z, p), theta(z, p)
-    return found
 
 
 def regression(target, *regressors):
@@ -76,17 +19,68 @@ def regression(target, *regressors):
     return matrix, offset, joint[0, 0] - matrix @ joint[1:, 0]
 
 
-def gaussian_mean(function, mean, cov, order: int = 40):
-    """M[function(x)], x ~ N(mean, cov), by a Gauss-Hermite product rule; function takes a list of
-    components."""
-    mean, cov = np.asarray(mean, dtype=float), np.asarray(cov, dtype=float)
+def is_mean(expected, sample):
+    """The sample's mean is the expected one, within four of its own standard errors: one chance in
+    16,000."""
+    sample = np.asarray(sample, dtype=float)
+    assert abs(sample.mean() - expected) < 4 * sample.std() / np.sqrt(sample.size)
+
+
+def has_moments(sample, mean, cov):
+    """Whether draws (N, n) have this mean and covariance, as `is_mean` asks."""
+    away = sample - mean
+    for i in range(len(cov)):
+        is_mean(mean[i], sample[:, i])
+        for j in range(i + 1):
+            is_mean(cov[i, j], away[:, i] * away[:, j])
+
+
+def gaussian_points(mean, cov, order: int = 40):
+    """Points (N, n) and weights (N,) of a Gauss-Hermite product rule for N(mean, cov)."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)
     grids = np.meshgrid(*[nodes] * len(mean), indexing="ij")
-    weight = np.ones_like(grids[0])
-    for w in np.meshgrid(*[weights / weights.sum()] * len(mean), indexing="ij"):
-        weight = weight * w
-    points = mean[:, None] + np.linalg.cholesky(cov) @ np.stack([g.ravel() for g in grids])
-    return float(np.sum(weight.ravel() * function(list(points))))
+    each = np.meshgrid(*[weights / weights.sum()] * len(mean), indexing="ij")
+    standard = np.stack([grid.ravel() for grid in grids], axis=-1)
+    return mean + standard @ np.linalg.cholesky(cov).T, np.prod(each, axis=0).ravel()
+
+
+def gaussian_mean(function, mean, cov):
+    """M[function(x)], x ~ N(mean, cov); function takes a list of components."""
+    points, weights = gaussian_points(np.array(mean), np.array(cov))
+    return float(weights @ function(list(points.T)))
+
+
+def mixture(weights, laws):
+    """Mean and covariance of a mixture of laws (mean, cov)."""
+    mean = sum(w * m for w, (m, _) in zip(weights, laws, strict=True))
+    spread = (P + np.outer(m - mean, m - mean) for m, P in laws)
+    return mean, sum(w * P for w, P in zip(weights, spread, strict=True))
+
+
+def steps_of(one, count):
+    """(A, constant, Q, H, constant, R) of the first steps of x' = A x + B v + a, y = H x + C w + b,
+    whose matrices `one.at` and laws `one.laws` tell: what the two references below take."""
+    _, (m_v, D_v), (m_w, D_w) = one.laws.values()
+    return [
+        (A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T)
+        for A, B, a, H, C, b in map(one.at, range(count))
+    ]
+
+
+def kalman_loop(steps, prior, y):
+    """Predicted and posterior law (mean, cov) at each step of one record y (N, p), NaN where
+    missing: the page's equations, with inverses.
+
+    `steps`: for each k (A, a, Q, H, b, R) of x' = A x + a + v, y = H x + b + w.
+    """
+    mean, cov = prior
+    for (A, a, Q, H, b, R), measured in zip(steps, y, strict=True):
+        predicted, seen = (mean, cov), ~np.isnan(measured)
+        H, R = H[seen], R[np.ix_(seen, seen)]
+        K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + R)
+        mean, cov = mean + K @ (measured - b)[seen] - K @ H @ mean, cov - K @ H @ cov
+        yield predicted, (mean, cov)
+        mean, cov = A @ mean + a, A @ cov @ A.T + Q
 
 
 def joint_posterior(steps, prior, y):
@@ -145,13 +139,7 @@ class Changing:
         return A, np.array([[1 + t, 0.0], [1.0, 0.5]]), np.array([u, -2 * u]), H, C, b
 
     def steps(self, count: int):
-        """A, constant, Q, H, constant, R of each step, as `joint_posterior` takes them."""
-        _, (m_v, D_v), (m_w, D_w) = self.laws.values()
-        each = map(self.at, range(count))
-        return [
-            (A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T)
-            for A, B, a, H, C, b in each
-        ]
+        return steps_of(self, count)
 
     def model(self) -> Model:
         state = [

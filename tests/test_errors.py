@@ -22,7 +22,7 @@ from kfcourse import (
     run,
     smooth,
 )
-from kfcourse.filters import aof, duof, fos, gated, kalman_filter, particle, pointmass
+from kfcourse.filters import aof, duof, gated
 
 pytestmark = pytest.mark.quick
 
@@ -37,7 +37,6 @@ Y = np.zeros(3)
     ("call", "message"),
     [
         (lambda: aof(MODEL), r"^aof expects a Structure, got Model: give linearised\(model\)"),
-        (lambda: fos(FILTER), r"^fos expects a Structure, got Filter aof-linearised: give linear"),
         (
             lambda: run(STRUCTURE, Y),
             r"^a run expects a Filter, got Structure linearised: give a filter",
@@ -56,13 +55,7 @@ Y = np.zeros(3)
             lambda: gaussian(FILTER),
             r"^gaussian expects a Model, got Filter aof-lin.*: give a model, .* filter",
         ),
-        (
-            lambda: kalman_filter(STRUCTURE),
-            r"^kalman_filter expects a Model, got Structure linearised",
-        ),
-        (lambda: particle(Y), r"^particle expects a Model, got ndarray"),
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
-        (lambda: pointmass(STRUCTURE), r"^pointmass expects a Model, got Structure linearised"),
         (
             lambda: design([FILTER], Ensemble(MODEL, 10, 2, 1)),
             r"^design expects a Design, got Filter",

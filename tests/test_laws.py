@@ -43,41 +43,6 @@ def test_among_many_matrices_a_singular_broken_or_unknown_one_does_not_disturb_t
         gain(cross, -np.abs(cov))
 
 
-@pytest.mark.parametrize("ratio", [1e8, 1e12, 1e16])
-@pytest.mark.parametrize("p", [2, 3])
-def test_equal_components_of_one_quantity_share_their_information_whatever_the_prior(ratio, p):
-    """Each of them adds 1/r to the information 1/P: after k steps the variance is 1 / (1/P + k p /
-    r).
-
-    The variance is a small difference, so the gain must be backward stable: its error, 1e-16 along
-    the direction in which the measurements agree, is squared and multiplied by P in Joseph's form.
-    """
-    r = 1e-4
-    law, G, R = (
-        Gaussian(np.zeros((1, 1)), np.full((1, 1, 1), ratio * r)),
-        np.ones((1, p, 1)),
-        r * np.eye(p)[None],
-    )
-    for k, level in enumerate((100.0, 80.0, 80.0), 1):
-        law = correct(
-            law, measurement(G, R, law)._replace(h=np.tile(law.mean, p)), level + np.arange(p)[None]
-        )
-        np.testing.assert_allclose(law.cov.item(), 1 / (1 / (ratio * r) + k * p / r), rtol=1e-7)
-    # F holds r to 1e-16 of P, and no more: the weights are so wrong that the components share,
-    # squared in the variance
-    np.testing.assert_allclose(law.mean.item(), 260 / 3 + (p - 1) / 2, rtol=1e-5)
-
-
-def test_the_gain_does_not_depend_on_units(rng):
-    cov, cross, units = (
-        covariances(rng, 4, 3),
-        rng.normal(size=(4, 2, 3)),
-        np.array([1e-9, 1.0, 1e8]),
-    )
-    scaled = gain(cross * units, cov * units[:, None] * units)
-    np.testing.assert_allclose(scaled * units, gain(cross, cov), rtol=1e-11, atol=1e-11)
-
-
 @pytest.mark.parametrize("cov", [[[-1.0]], [[1.0, 0.0], [0.0, -1.0]], [[[1.0]], [[-1e-300]]]])
 def test_a_negative_variance_is_refused(cov):
     cov = np.array(cov)

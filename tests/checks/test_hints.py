@@ -33,9 +33,22 @@ PAIR = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], parts=("sum",
 FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "Theta"))
 
 
+NUMBERS = asks(lambda a: a, [(np.array([2.0, 3.5]),)])
+MATRIX = asks(lambda a: a, [(np.array([[1.0, 2.0], [3.0, 5.0]]),)])
+SYMBOLS = asks(lambda a: a, [(sp.ImmutableMatrix([[z, p], [1, 2]]),)])
+
+
 @pytest.mark.parametrize(
     ("question", "name", "answer"),
     [
+        (NUMBERS, "sign", lambda a: -a),
+        (NUMBERS, "root", np.sqrt),
+        (NUMBERS, "square", lambda a: a**2),
+        (NUMBERS, "factor-2", lambda a: a / 2),
+        (NUMBERS, "factor-half", lambda a: 2 * a),
+        (NUMBERS, "inverse", lambda a: 1 / a),
+        (MATRIX, "transposed", lambda a: a.T),
+        (SYMBOLS, "transposed", lambda a: a.T),
         (CARRIED, "scalars-only", lambda A, P: A.T @ P @ A),
         (CARRIED, "unused", lambda A, P: A @ A.T),
         (CARRIED, "not-symmetric", lambda A, P: A @ P @ A.T + A),

@@ -1,6 +1,8 @@
 """Keys of sets f, g, h, j, l, o, p against independent references: the package's filters,
 derivatives, an integrator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -57,17 +59,7 @@ def test_the_extended_filter_is_the_package_s(name):
     lin = linearised(model)
     functions = linearisation(model)
     mean, cov = model.prior.mean + 0.3 * np.sqrt(np.diagonal(model.prior.cov)), model.prior.cov
-    shifted = Model.define(
-        list(model.state_equation),
-        list(model.meter_equation),
-        {k: float(v) for k, v in model.parameters.items()},
-        symbols={
-            "x": [s.name for s in model.x],
-            "v": [s.name for s in model.v],
-            "w": [s.name for s in model.w],
-        },
-        prior={"mean": mean, "variance": cov},
-    )
+    shifted = replace(model, prior=Gaussian(mean, cov))
     z, p, lam, Psi = extended.run_filter(y, mean, cov, *functions)
     one = aof(linearised(shifted))
     law, before = run(one, y), predictions(one, y)

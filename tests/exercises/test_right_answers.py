@@ -6,8 +6,6 @@ import pytest
 import sympy as sp
 from numpy import matrix_transpose as T
 from scipy.integrate import quad
-from scipy.linalg import solve_discrete_are
-from scipy.stats import chi2
 from sympy import cos, sin
 
 from kfcourse.checks import exercise
@@ -104,39 +102,10 @@ def i3_solved(y0, y1, y2, dt):
     return found[r], found[v], found[a]
 
 
-def i5_column_by_column(lam, S, y, H, R):
-    """Givens rotations instead of a ready factorisation."""
-    p, n = H.shape
-    M = np.block([[np.linalg.cholesky(R), H @ S], [np.zeros((n, p)), S]])
-    for row in range(n + p):
-        for column in range(row + 1, n + p):
-            size = np.hypot(M[row, row], M[row, column])
-            if size > 0:
-                c, s = M[row, row] / size, M[row, column] / size
-                M[:, [row, column]] = M[:, [row, column]] @ np.array([[c, -s], [s, c]])
-    Z = M[p:, p:]
-    return lam + M[p:, :p] @ np.linalg.solve(M[:p, :p], y - H @ lam), Z * np.where(
-        np.diag(Z) < 0, -1, 1
-    )
-
-
 def j1_by_rotations(r, phi, eps):
     up = sp.Matrix([[cos(eps), 0, -sin(eps)], [0, 1, 0], [sin(eps), 0, cos(eps)]])
     about = sp.Matrix([[cos(phi), -sin(phi), 0], [sin(phi), cos(phi), 0], [0, 0, 1]])
     return tuple(about * up * sp.Matrix([r, 0, 0]))
-
-
-def j3_by_the_filter(alpha):
-    """The index at which the gain of a Kalman filter converges to alpha, by bisection; T and sigma
-    are 1."""
-    A, b, H = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]]), np.array([[1, 0]])
-    low, high = 1e-4, 1e4
-    while high / low > 1 + 1e-13:
-        index = np.sqrt(low * high)
-        Psi = solve_discrete_are(A.T, H.T, index**2 * b @ b.T, np.eye(1))
-        K = Psi[:, 0] / (Psi[0, 0] + 1)
-        low, high = (index, high) if K[0] < alpha else (low, index)
-    return K[1], index
 
 
 def j5_solved(a, T, alpha, beta):
@@ -159,34 +128,6 @@ def l6_from_the_motion(V, a, tau):
     t = sp.Symbol("t")
     s = V * t + a * t**2 / 2
     return s.subs(t, -tau) - s.subs(t, 0), sp.diff(s, t).subs(t, -tau) - V
-
-
-def m5_at_once(z, p, ahead, Psi, A, Q):
-    """One dense law of the record: the information of the filter's corrections, and the motion."""
-    steps, n = z.shape
-    J, b = np.zeros((steps * n, steps * n)), np.zeros(steps * n)
-    for k in range(steps):
-        at = slice(k * n, k * n + n)
-        own = np.linalg.inv(p[k]) - (np.linalg.inv(Psi[k]) if k else 0)
-        J[at, at] += own
-        b[at] += np.linalg.solve(p[k], z[k]) - (np.linalg.solve(Psi[k], ahead[k]) if k else 0)
-        if k:
-            both = slice((k - 1) * n, (k + 1) * n)
-            D = np.hstack([-A, np.eye(n)])
-            c = ahead[k] - A @ z[k - 1]
-            J[both, both] += D.T @ np.linalg.solve(Q, D)
-            b[both] += D.T @ np.linalg.solve(Q, c)
-    P = np.linalg.inv(J)
-    return (P @ b).reshape(steps, n), np.array(
-        [P[k * n : k * n + n, k * n : k * n + n] for k in range(steps)]
-    )
-
-
-def n4_by_whitening(nu, F, probability):
-    white = np.stack(
-        [np.linalg.solve(np.linalg.cholesky(cov), entry) for entry, cov in zip(nu, F, strict=True)]
-    )
-    return np.linalg.norm(white, axis=1) ** 2, -chi2.isf(1 - probability, 3) * -1
 
 
 def one_time(variance, q):
@@ -280,15 +221,11 @@ RIGHT = [
     ("f2", "53", f2_by_logarithms),
     ("h4", "53", h4_solved),
     ("i3", "53", i3_solved),
-    ("i5", "53", i5_column_by_column),
     ("j1", "53", j1_by_rotations),
-    ("j3", "53", j3_by_the_filter),
     ("j5", "53", j5_solved),
     ("j6", "53", j6_closed),
     ("k2", "53", k2_through_p),
     ("l6", "53", l6_from_the_motion),
-    ("m5", "53", m5_at_once),
-    ("n4", "53", n4_by_whitening),
 ]
 
 

@@ -4,7 +4,7 @@ import control
 import numpy as np
 import pytest
 
-from kfcourse import Gaussian, Model, ModelError, run, simulate
+from kfcourse import Model, ModelError, run, simulate
 from kfcourse.filters.alphabeta import (
     alpha_beta,
     steady_alpha,
@@ -99,19 +99,6 @@ def test_a_growing_memory_is_the_line_through_all_measurements():
 
 
 # --- the covariance
-
-
-def test_it_can_be_built_for_a_model_written_by_hand():
-    model = Model.define(
-        ["r + T*s + v", "s + w"],
-        "r + n",
-        {"T": 0.5},
-        symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]},
-    )
-    one = alpha_beta(model, 0.3, 0.1)
-    start = one.init(2)
-    assert isinstance(start.posterior, Gaussian)
-    assert one.step(one.step(start, np.ones((2, 1))), np.ones((2, 1))).step == 2
 
 
 # --- bad input

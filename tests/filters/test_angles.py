@@ -20,7 +20,7 @@ from kfcourse.filters import (
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees
 from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Instant, simulate
+from kfcourse.montecarlo.ensemble import Ensemble, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.scenarios.navigation import Dynamics, Sensor, fuse, observe
 from kfcourse.symbolic.angular import AngleWarning
@@ -32,20 +32,6 @@ from kfcourse.symbolic.structure import gaussian, linearised
 pytestmark = pytest.mark.quick
 
 PI = np.pi
-
-
-def radar(side=1, angles=("y2",), speed=150.0, spread=1.0):
-    """A target 10 km off, on the positive x axis (side 1) or the negative one (-1), which it
-    crosses; range and bearing."""
-    prior = side * np.array([10_000.0, -3_000.0, -20.0, speed])
-    return Model.define(
-        ["x + T*vx", "y + T*vy", "vx + s*v1", "vy + s*v2"],
-        ["sqrt(x**2 + y**2) + 50*w1", "atan2(y, x) + 0.01*w2"],
-        {"T": 1.0, "s": 1.0},
-        symbols={"x": ["x", "y", "vx", "vy"]},
-        angles=list(angles),
-        prior={"mean": prior, "variance": np.square([100 * spread, 100 * spread, 15, 15])},
-    )
 
 
 # ---------------------------------------------------------------- what is said of a model
@@ -166,105 +152,17 @@ def test_points_of_an_angle_that_go_round_the_circle_warn(build):
 # -pi
 
 
-def filters_of(model):
-    """Filters without design, the same for the scene and its mirror image."""
-    faster = Model.define(
-        list(model.state_equation),
-        list(model.meter_equation),
-        model.replace(s=5).parameters,
-        symbols={"x": [s.name for s in model.x]},
-        prior={"mean": model.prior.mean, "variance": model.prior.cov},
-        angles={
-            "x": [model.x[i].name for i in model.angles.x],
-            "y": [model.measured[i] for i in model.angles.y],
-        },
-    )
-    tangent, points = linearised(model), unscented(model)
-    return [
-        aof(tangent),
-        aof(points),
-        aof(gauss_hermite(model, 3)),
-        iterated(tangent, 3),
-        iterated(points, 3),
-        imm([tangent, linearised(faster)], [[0.9, 0.1], [0.2, 0.8]]),
-    ]
-
-
-def designs_of(model):
-    tangent = linearised(model)
-    return [
-        duof(model),
-        *(family(tangent, arguments) for family in (fos, mfos) for arguments in (2, 3)),
-    ]
-
-
-@pytest.fixture(scope="module")
-def scenes():
-    """A scene across the positive x axis, where bearings are small, and the same scene turned by
-    half a turn."""
-    plain, turned = radar(1, angles=()), radar(-1)
-    x, y = simulate(plain, 150, 41, seed=3)
-    assert (
-        (np.abs(y[..., 1]) < 1).all()
-        and (y[..., 1].min(axis=0) < 0).all()
-        and (y[..., 1].max(axis=0) > 0).all()
-    )
-    other = np.stack([y[..., 0], wrapped(y[..., 1] + PI)], axis=-1)
-    return plain, turned, x, y, other
-
-
-def test_filters_on_the_far_side_of_the_circle_give_the_mirror_image(scenes):
-    """Turning the scene by half a turn changes the signs of the state and nothing else.
-
-    On the side where no angle is near pi the models without declared angles are right, and tested
-    elsewhere. The tolerance is the rounding of a bearing near pi, 4e-16, over its deviation of
-    0.01, times positions of 1e4 and many steps.
-    """
-    plain, turned, _, y, other = scenes
-    missing = np.zeros(y.shape, dtype=bool)
-    missing[3, :20, 1] = True
-    y, other = np.where(missing, np.nan, y), np.where(missing, np.nan, other)
-    for here, there in zip(filters_of(plain), filters_of(turned), strict=True):
-        expected, found = run(here, y), run(there, other)
-        np.testing.assert_allclose(found.mean, -expected.mean, atol=1e-5, err_msg=here.name)
-        np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-7, atol=1e-4, err_msg=here.name)
-        # whole turns do not matter, as an instrument may count to 360
-        again = run(there, other + 2 * PI * np.array([0, 3]))
-        np.testing.assert_allclose(again.mean, found.mean, atol=1e-5, err_msg=here.name)
-
-
-def test_designed_filters_too(scenes):
-    plain, turned, x, y, other = scenes
-    steps = len(y) - 1
-    # declared here too: the filters with three arguments take the innovation of an angle as
-    # regressor
-    plain = radar(1)
-    here = design(designs_of(plain), (Instant(x[k], y[k], x[k + 1]) for k in range(steps)))
-    there = design(designs_of(turned), (Instant(-x[k], other[k], -x[k + 1]) for k in range(steps)))
-    for one, two in zip(here, there, strict=True):
-        # coefficients are regressions over 150 trajectories of states that hardly differ: some
-        # digits more are lost
-        np.testing.assert_allclose(
-            run(two, other[:-1]).mean, -run(one, y[:-1]).mean, atol=1e-2, err_msg=one.name
-        )
-
-
-def test_innovations_and_normalised_errors_go_the_short_way(scenes):
-    _, turned, x, _, other = scenes
-    structure = linearised(turned)
-    before = predictions(aof(structure), other)
-    found = innovations(structure.measure, before, other)
-    squares = found.value[..., 1] ** 2 / found.cov[..., 1, 1]
-    # 6,000 normal numbers: 30 is passed with a chance of 1e-3; a turn would be 1e5
-    assert np.nanmax(squares) < 30
-    assert innovations(linearised(radar(-1, ())).measure, before, other).value[..., 1].max() > 6
-
+def test_innovations_and_normalised_errors_go_the_short_way():
     angle = Model.define(
         "x + 0.1*v", "x + 0.1*w", prior={"mean": 3, "variance": 0.01}, angles=["x", "y"]
     )
     x, y = simulate(angle, 500, 20, seed=1)
     assert np.abs(np.diff(x, axis=0)).max() > 6  # it jumps
-    posterior = run(kalman_filter(angle), y)
+    one, structure = kalman_filter(angle), linearised(angle)
+    value, cov = innovations(structure.measure, predictions(one, y), y)
+    # 10,000 squares of normal numbers: 30 is passed with a chance of 1e-3; a turn would be 1e3
+    assert (value[..., 0] ** 2 / cov[..., 0, 0]).max() < 30
+    posterior = run(one, y)
     # of one step; 20 are more
     assert nees(x, posterior, angle.angles.x).mean() == pytest.approx(1, abs=4 * np.sqrt(2 / 500))
     assert nees(x, posterior).mean() > 10
@@ -362,6 +260,15 @@ def test_errors_of_a_comparison_go_the_short_way():
         # Coefficients fitted over 2000 trajectories cost some parts in a thousand; a single lost
         # turn would cost 4 pi^2 / 2000 of an error variance of 0.03, two thirds of it.
         assert ratio.max() < 1.1, name
+
+
+def test_what_a_filter_remembers_of_a_measured_angle_is_its_innovation():
+    model = Model.define(
+        "x + 0.1*v", "x + 0.2*w", angles=["x", "y"], prior={"mean": 3.1, "variance": 0.01}
+    )
+    (one,) = design([fos(linearised(model), 3)], Ensemble(model, 100, 1, seed=1))
+    kept = one.step(one.init(3), np.array([[3.0], [-3.1], [np.nan]])).memory.measurements
+    np.testing.assert_allclose(kept[0].ravel(), [-0.1, 2 * PI - 6.2, 0], atol=1e-12)
 
 
 # ---------------------------------------------------------------- densities on the circle

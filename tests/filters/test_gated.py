@@ -17,7 +17,6 @@ from kfcourse import (
     unscented,
 )
 from kfcourse.filters import (
-    alpha_beta,
     aof,
     duof,
     fos,
@@ -34,7 +33,6 @@ from kfcourse.linear.consistency import innovations
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.records import weights
-from kfcourse.scenarios.radar import kinematic
 
 pytestmark = pytest.mark.quick
 
@@ -110,17 +108,6 @@ def test_in_every_filter_what_is_refused_is_missing():
             assert np.abs(run(one, y).mean - found.mean).max() > 0.5 or one.name.startswith(
                 "robust"
             )
-
-
-def test_the_alpha_beta_filter_has_a_gate_too():
-    model = kinematic(1.0, dimensions=2, noise_sd=0.1)
-    y = simulate(model, 3, 12, seed=4).y.copy()
-    y[8, 1] += 500.0
-    guarded = gated(alpha_beta(model, 0.5, 0.2), structure=linearised(model))
-    assert refused(guarded, y)[8, 1]
-    np.testing.assert_array_equal(
-        run(guarded, y).mean, run(alpha_beta(model, 0.5, 0.2), without(guarded, y)).mean
-    )
 
 
 @pytest.mark.parametrize("probability", [0.9, 0.99])

@@ -1,9 +1,9 @@
 """The interacting-multiple-model filter against a slow loop."""
 
-import math
-
 import numpy as np
+import oracles
 import pytest
+from scipy.stats import multivariate_normal
 
 from kfcourse import JumpModel, Model, linearised, run, simulate
 from kfcourse.filters import gpb2, logic_dynamic
@@ -52,64 +52,40 @@ def follow(one, y):
 # --- independent references
 
 
-def slow_imm(y, systems, pi, start, mean, cov):
-    """Blom and Bar-Shalom's algorithm for one trajectory, straight from the page: loops, and
-    inverses of numbers."""
-    modes = len(systems)
-    c = list(start)
-    predicted = [(np.array(mean), np.array(cov)) for _ in range(modes)]
-    found = []
-    for measurement in y:
-        kept = [i for i, value in enumerate(measurement) if not math.isnan(value)]
-        corrected, likelihood = [], []
-        for (_, H, _, R), (x, P) in zip(systems, predicted, strict=True):
-            if kept:
-                h, r = H[kept], R[np.ix_(kept, kept)]
-                nu, S = measurement[kept] - h @ x, h @ P @ h.T + r
-                K = P @ h.T @ np.linalg.inv(S)
-                corrected.append((x + K @ nu, P - K @ S @ K.T))
-                exponent = -0.5 * nu @ np.linalg.inv(S) @ nu
-                likelihood.append(
-                    math.exp(exponent) / math.sqrt((2 * math.pi) ** len(kept) * np.linalg.det(S))
-                )
-            else:
-                corrected.append((x, P))
-                likelihood.append(1.0)
-        total = sum(c[j] * likelihood[j] for j in range(modes))
-        mu = [c[j] * likelihood[j] / total for j in range(modes)]
-        z = sum(mu[j] * corrected[j][0] for j in range(modes))
-        p = sum(
-            mu[j] * (corrected[j][1] + np.outer(corrected[j][0] - z, corrected[j][0] - z))
-            for j in range(modes)
-        )
-        found.append((z, p, np.array(mu)))
-        c = [sum(pi[i][j] * mu[i] for i in range(modes)) for j in range(modes)]
-        predicted = []
-        for j, (A, _, Q, _) in enumerate(systems):
-            weight = [pi[i][j] * mu[i] / c[j] for i in range(modes)]
-            x = sum(weight[i] * corrected[i][0] for i in range(modes))
-            P = sum(
-                weight[i] * (corrected[i][1] + np.outer(corrected[i][0] - x, corrected[i][0] - x))
-                for i in range(modes)
-            )
-            predicted.append((A @ x, A @ P @ A.T + Q))
+def slow_imm(y, systems, pi, start, prior):
+    """Blom and Bar-Shalom's algorithm for one trajectory, straight from the page; `systems`: (A, a,
+    Q, H, b, R) of each mode."""
+    c, predicted, found = start, [prior] * len(systems), []
+    for measured in y:
+        seen, corrected, likelihood = ~np.isnan(measured), [], []
+        for system, law in zip(systems, predicted, strict=True):
+            ((_, posterior),) = oracles.kalman_loop([system], law, [measured])
+            corrected.append(posterior)
+            H, R = system[3][seen], system[5][np.ix_(seen, seen)]
+            expected = multivariate_normal(H @ law[0], H @ law[1] @ H.T + R) if seen.any() else None
+            likelihood.append(expected.pdf(measured[seen]) if expected else 1.0)
+        mu = c * likelihood / (c @ likelihood)
+        found.append((*oracles.mixture(mu, corrected), mu))
+        c = mu @ pi
+        mixed = [oracles.mixture(mu * pi[:, j] / c[j], corrected) for j in range(len(systems))]
+        predicted = [
+            (A @ x, A @ P @ A.T + Q) for (A, _, Q, *_), (x, P) in zip(systems, mixed, strict=True)
+        ]
     return found
 
 
 def matrices(m):
-    system, _, _ = linear_system(m)
-    return system.A, system.H, system.Q, system.R
+    system, a, b = linear_system(m)
+    return system.A, a, system.Q, system.H, b, system.R
 
 
 @pytest.mark.parametrize("gaps", [False, True])
 def test_against_a_slow_loop(gaps):
     y = data(gaps=gaps)
     mean, cov, probability, *_ = follow(imm([linearised(m) for m in MODELS], PI, START), y)
-    law = MODELS[0].prior
+    systems = [matrices(m) for m in MODELS]
     for trajectory in range(y.shape[1]):
-        expected = slow_imm(
-            y[:, trajectory], [matrices(m) for m in MODELS], PI, START, law.mean, law.cov
-        )
+        expected = slow_imm(y[:, trajectory], systems, PI, START, MODELS[0].prior)
         for k, (z, p, mu) in enumerate(expected):
             np.testing.assert_allclose(mean[k, trajectory], z, rtol=0, atol=ROUNDING)
             np.testing.assert_allclose(cov[k, trajectory], p, rtol=0, atol=ROUNDING)
@@ -135,37 +111,35 @@ def test_probabilities_sum_to_one_even_where_likelihoods_underflow():
 # --- bad input
 
 
+SCALAR = Model.define("x + v", "x + w")
+NAMED = Model.define(["r + s", "s + v1"], ["r + w1", "s + w2"], symbols={"x": ["r", "s"]})
+OTHER_PRIOR = Model.define(["x1 + x2", "x2 + v1"], ["x1 + w1", "x2 + w2"])
+TWO = [[0.9, 0.1], [0.1, 0.9]]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"transition": [[0.9, 0.1], [0.1, 0.9]]}, r"transition must have the shape \(3, 3\)"),
+        ({"transition": TWO}, r"transition must have the shape \(3, 3\)"),
         ({"transition": PI.T}, "sum to 1 in each row"),
         ({"transition": 2 * np.eye(3) - np.ones((3, 3)) / 3}, "must be probabilities"),
         ({"probabilities": [0.5, 0.5]}, r"probabilities must have the shape \(3,\)"),
         ({"probabilities": [0.5, 0.6, -0.1]}, "probabilities must be probabilities"),
         ({"probabilities": [np.nan, 0.5, 0.5]}, "probabilities must be probabilities"),
+        *(
+            ({"structures": [linearised(MODELS[0]), linearised(other)], "transition": TWO}, message)
+            for other, message in (
+                (SCALAR, "need the same state"),
+                (NAMED, "need the same state"),
+                (OTHER_PRIOR, r"need the same state, .* and prior"),
+            )
+        ),
     ],
 )
-def test_numbers_that_are_no_probabilities_are_refused(change, message):
-    good = {"structures": [linearised(m) for m in MODELS], "transition": PI, "probabilities": START}
+def test_what_does_not_fit_together_is_refused(change, message):
+    given = {"structures": [linearised(m) for m in MODELS], "transition": PI}
     with pytest.raises(ValueError, match=message):
-        imm(**(good | change))
-
-
-def test_models_that_do_not_fit_together_are_refused():
-    first = linearised(MODELS[0])
-    scalar = linearised(Model.define("x + v", "x + w"))
-    other_names = linearised(
-        Model.define(
-            ["r + s", "s + v1"], ["r + w1", "s + w2"], symbols={"x": ["r", "s"]}, prior=PRIOR
-        )
-    )
-    other_prior = linearised(Model.define(["x1 + x2", "x2 + v1"], ["x1 + w1", "x2 + w2"]))
-    for other in (scalar, other_names, other_prior):
-        with pytest.raises(ValueError, match=r"need the same state, .* and prior"):
-            imm([first, other], [[0.9, 0.1], [0.1, 0.9]])
-    with pytest.raises(TypeError, match="expects a list of structures"):
-        imm([], PI)
+        imm(**(given | change))
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import oracles
 import pytest
 from scipy import stats
 
@@ -53,12 +54,8 @@ RUNS, STEPS, SEED = 6000, 4, 5
 @pytest.fixture(scope="module")
 def direct(linear):
     """The comparison, and errors and covariances of each trajectory kept beside it."""
-    wrong = Model.define(
-        list(linear.state_equation),
-        list(linear.meter_equation),
-        prior={"variance": 9},
-        symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
-    )
+    one = Gaussian(np.zeros(2), np.eye(2))
+    wrong = replace(linear, prior=Gaussian(np.zeros(2), 9 * np.eye(2)), meter_noise=one)
     filters = [aof(gaussian(linear)), duof(linear), replace(kalman_filter(wrong), name="wrong")]
     result = compare(filters, linear, RUNS, STEPS, SEED, same_ensemble=True, progress=False)
     x, y = stored(linear, RUNS, STEPS, SEED)
@@ -107,44 +104,25 @@ def test_the_statistics_are_those_of_the_trajectories(direct):
 
 
 @pytest.mark.filterwarnings("error")
-def test_the_normalised_error_of_a_scalar_filter_is_the_mean_of_e2_over_p():
-    """A variance for each trajectory, one for all, and a vector of one component beside another.
-
-    A claim of variance 0 is right if there is no error (0), and infinitely wrong if there is
-    (infinity).
-    """
+def test_a_claim_of_variance_0_is_right_without_an_error_and_infinitely_wrong_with_one():
+    """A variance for each trajectory, and one for all."""
     x = np.array([1.0, -2.0, 3.0, 0.5, -1.5])
-    p = np.array([0.5, 2.0, 4.0, 0.25, 1.0])
-    still = np.zeros_like(x)  # the estimate is 0: x is the error
+    p = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
 
     def recorded(errors, cov):
-        sums = Sums.empty(1, 1, errors.shape[1], 2)
-        sums.record(
-            0, 0, errors, Gaussian(np.zeros_like(errors), cov), np.ones(5), np.array([0, 2])
-        )
+        sums = Sums.empty(1, 1, 1, 2)
+        law = Gaussian(np.zeros((5, 1)), cov)
+        sums.record(0, 0, errors[:, None], law, np.ones(5), np.array([0, 2]))
         return sums.normalised[0, 0]
 
-    def expected(quotients):
-        return [quotients[:2].sum(), quotients[2:].sum()]
-
-    np.testing.assert_allclose(
-        recorded(x[:, None], p[:, None, None]), expected(x**2 / p), rtol=1e-14
-    )
-    np.testing.assert_allclose(
-        recorded(x[:, None], np.array([[2.0]])), expected(x**2 / 2), rtol=1e-14
-    )
-    pairs, covs = np.stack([x, still], axis=1), p[:, None, None] * np.eye(2)
-    np.testing.assert_allclose(recorded(pairs, covs), expected(x**2 / p / 2), rtol=1e-14)
-
-    certain = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
-    known = np.where(certain > 0, x, 0.0)
+    known = np.where(p > 0, x, 0.0)
     quotients = np.array([0.0, 2.0, 0.0, 1.0, 2.25])
     np.testing.assert_allclose(
-        recorded(known[:, None], certain[:, None, None]), expected(quotients), rtol=1e-14
+        recorded(known, p[:, None, None]), [quotients[:2].sum(), quotients[2:].sum()], rtol=1e-14
     )
-    assert recorded(known[:, None], np.array([[0.0]])).tolist() == [np.inf, np.inf]
-    assert recorded(still[:, None], np.array([[0.0]])).tolist() == [0, 0]
-    assert recorded(x[:, None], certain[:, None, None]).tolist() == [np.inf, np.inf]
+    assert recorded(known, np.array([[0.0]])).tolist() == [np.inf, np.inf]
+    assert recorded(np.zeros(5), np.array([[0.0]])).tolist() == [0, 0]
+    assert recorded(x, p[:, None, None]).tolist() == [np.inf, np.inf]
 
 
 def test_differences_and_ratios_are_paired(direct):
@@ -161,16 +139,6 @@ def test_differences_and_ratios_are_paired(direct):
         ours,
         theirs,
     )
-
-
-def test_pairing_pays(direct):
-    result, _ = direct
-    paired = result.difference("duof", "aof-gaussian").standard_error
-    separate = np.hypot(
-        result.error_variance("duof").standard_error,
-        result.error_variance("aof-gaussian").standard_error,
-    )
-    assert (paired < separate / 3).all()
 
 
 def test_a_filter_does_not_differ_from_itself(direct):
@@ -194,31 +162,6 @@ def test_an_unknown_name_is_answered_with_the_known_ones(direct):
     ):
         with pytest.raises(KeyError, match="aof-gaussian, duof, wrong"):
             ask("ekf")
-
-
-def test_the_optimal_filter_s_own_covariance_is_right_and_no_other_is_better(direct):
-    result, _ = direct
-    normalised = result.normalised_error("aof-gaussian")
-    assert (abs(normalised.value - 1) < SIGMA * normalised.standard_error).all()
-    claimed, actual = (
-        result.own_variance("aof-gaussian").value,
-        result.error_variance("aof-gaussian"),
-    )
-    assert (abs(claimed - actual.value) < SIGMA * actual.standard_error).all()
-    bias = result.error_mean("aof-gaussian")
-    assert (abs(bias.value) < SIGMA * bias.standard_error).all()
-    for name in ("duof", "wrong"):
-        gap = result.difference(name, "aof-gaussian")
-        assert (gap.value > -SIGMA * gap.standard_error).all()
-
-
-def test_the_ranking_is_by_mean_relative_variance(direct):
-    result, _ = direct
-    ranking = result.ranking()
-    assert sorted(name for name, _ in ranking) == sorted(result.names)
-    values = [float(estimate.value) for _, estimate in ranking]
-    assert values == sorted(values)
-    assert ranking[-1][0] == "wrong"
 
 
 def test_intervals_are_student_s(direct):
@@ -245,6 +188,7 @@ def test_of_means_the_jackknife_is_the_usual_standard_error():
     assert estimate.freedom == 9
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors
     around 190."""
@@ -298,7 +242,7 @@ def test_weights_make_up_for_the_wider_law():
         w = weights(prior, x, 2.0)
         assert w.min() > 0 and w.max() <= 2
         for sample, truth in ((w, 1.0), (w * x[:, 0], 1.0), (w * (x[:, 0] - 1) ** 2, 4.0)):
-            assert abs(sample.mean() - truth) < SIGMA * sample.std() / np.sqrt(20_000)
+            oracles.is_mean(truth, sample)
     assert (weights(prior, x, None) == 1).all()
 
 
@@ -506,7 +450,6 @@ def test_where_all_errors_are_zero_filters_are_equal(variant53):
 
 # ---------------------------------------------------------------- the table of the page
 
-PAGE_RUNS = 1_000_000
 COLUMNS = (
     "aof-gaussian",
     "aof-linearised",
@@ -526,88 +469,42 @@ PAGE = {  # D_k x 10^4, last digit
 
 
 @pytest.fixture(scope="module")
-def lab_filters(variant53):
+def repeated(variant53):
+    """Error variances (repeats, filters, steps) in eight independent comparisons, each with a
+    design of its own, that together are as large as the page's, of 10^6 trajectories."""
     structures = gaussian(variant53), linearised(variant53)
-    return [
-        *(aof(one) for one in structures),
+    filters = [
+        *(aof(structure) for structure in structures),
         duof(variant53),
-        *(family(one) for family in (fos, mfos) for one in structures),
+        *(family(structure) for family in (fos, mfos) for structure in structures),
     ]
+    results = (
+        compare(filters, variant53, 125_000, 11, seed, same_ensemble=True, progress=False)
+        for seed in range(8)
+    )
+    return np.array([[each.error_variance(name).value for name in COLUMNS] for each in results])
 
 
-@pytest.fixture(scope="module")
-def lab(lab_filters, variant53):
-    return compare(lab_filters, variant53, 200_000, 11, seed=53, same_ensemble=True, progress=False)
-
-
+@pytest.mark.slow  # the golden comparison of variant 53 is the same with 20,000 trajectories
 @pytest.mark.parametrize("k", PAGE)
-@pytest.mark.parametrize("name", COLUMNS)
-def test_the_table_of_the_page_is_reproduced(lab, name, k):
-    printed, digit = PAGE[k]
-    # Two independent ensembles: ours, and the page's of 10^6, whose error is ours times the root of
-    # the sizes' ratio.
-    both = np.sqrt(1 + lab.runs / PAGE_RUNS)
-    reference = printed[COLUMNS.index(name)] * 1e-4
-    found = lab.error_variance(name)[k]
-    assert abs(found.value - reference) < SIGMA * both * found.standard_error + 0.5e-4 * digit
+def test_the_table_of_the_page_is_reproduced(repeated, k):
+    """Variances, and their ratios to the Gaussian AOF's, which common trajectories tell far better.
 
-
-REPEATS = 8
-
-
-@pytest.fixture(scope="module")
-def repeated(lab_filters, variant53):
-    """Ratios to the Gaussian AOF, (repeats, filters, steps), in independent runs that together are
-    as large as the page's."""
-    ratios = []
-    for seed in range(REPEATS):
-        result = compare(
-            lab_filters,
-            variant53,
-            PAGE_RUNS // REPEATS,
-            11,
-            seed,
-            same_ensemble=True,
-            progress=False,
-        )
-        ratios.append([result.relative(name, "aof-gaussian").value for name in COLUMNS])
-    return np.array(ratios)
-
-
-@pytest.mark.parametrize("k", PAGE)
-def test_the_ratios_to_the_gaussian_aof_are_the_page_s(repeated, k):
-    """Ratios on common trajectories are known far better than the variances themselves.
-
-    Their error is taken from the scatter of independent runs, each with a design of its own: a
-    standard error from one run holds for the filter as designed there, and does not know how much
-    its coefficients would vary.
+    Their error is taken from the scatter of the comparisons: a standard error from one holds for
+    the filters as designed there.
     """
-    printed, digit = PAGE[k]
-    printed = np.array(printed)
-    ratios = repeated[:, :, k]
+    printed, digit = np.array(PAGE[k][0]), PAGE[k][1]
+    variances = 1e4 * repeated[:, :, k]
     # Our mean and the page's run have the same size, so the same error; Student's quantile of 4
     # sigma for 8 runs.
-    error = np.sqrt(2) * ratios.std(axis=0, ddof=1) / np.sqrt(REPEATS)
-    quantile = stats.t.isf(stats.norm.sf(SIGMA), REPEATS - 1)
-    rounding = 0.5 * digit / printed[0] * (1 + printed / printed[0])
-    assert (abs(ratios.mean(axis=0) - printed / printed[0]) < quantile * error + rounding).all()
-
-
-def test_at_the_start_all_filters_are_near_the_page_s_value(lab):
-    for name in COLUMNS:
-        found = lab.error_variance(name)[0]
-        # "all near 11.92": filters of one step differ by less than a per cent
-        assert (
-            abs(found.value - 11.92e-4)
-            < SIGMA * np.sqrt(1.2) * found.standard_error + 0.01 * 11.92e-4
-        )
-
-
-@pytest.mark.parametrize("name", sorted(set(COLUMNS) - {"duof"}))
-def test_from_the_second_step_on_the_duof_is_the_least_accurate(lab, name):
-    # Averaged over k = 2 ... 10, where the page's table has the DUOF last in every row.
-    low, _ = lab.mean_gap_difference("duof", name, slice(2, None)).interval(0.95)
-    assert low > 0
+    quantile = stats.t.isf(stats.norm.sf(SIGMA), 7)
+    ratios, expected = variances / variances[:, :1], printed / printed[0]
+    for sample, value, rounding in (
+        (variances, printed, 0.5 * digit),
+        (ratios, expected, 0.5 * digit / printed[0] * (1 + expected)),
+    ):
+        error = np.sqrt(2) * sample.std(axis=0, ddof=1) / np.sqrt(8)
+        assert (abs(sample.mean(axis=0) - value) < quantile * error + rounding).all()
 
 
 def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):

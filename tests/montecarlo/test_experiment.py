@@ -4,6 +4,7 @@ numbers."""
 import tracemalloc
 
 import numpy as np
+import oracles
 import pytest
 
 from kfcourse.filters.approximations import aof
@@ -45,52 +46,8 @@ def vector():
 # ---------------------------------------------------------------- simulation
 
 
-def test_trajectories_satisfy_the_equations(vector):
-    x, y = simulate(vector, 1000, 5, seed=3)
-    assert (x.shape, y.shape) == ((5, 1000, 2), (5, 1000, 2))
-    # What the equations leave is noise: v and w recovered from x and y.
-    v1 = (x[1:, :, 0] - 0.9 * x[:-1, :, 0] - 0.2 * x[:-1, :, 1]) / 0.3
-    difference = x[1:, :, 1] - 0.8 * x[:-1, :, 1]
-    w = np.stack([y[..., 0] - x[..., 0], (y[..., 1] - x[..., 1] + x[..., 0]) / 0.5])
-    for sample, mean, variance in (
-        (v1, 1, 2),
-        (difference, 1, 1 + 3 - 2 * 0.5),
-        (w[0], 0.5, 1),
-        (w[1], 0.5, 2),
-    ):
-        n = sample.size
-        assert abs(sample.mean() - mean) < SIGMA * np.sqrt(variance / n)
-        assert abs(sample.var() - variance) < SIGMA * variance * np.sqrt(2 / n)
-    for left, right, cov, product in ((v1, difference, 0.3, 2 * 3), (w[0], w[1], 0.2, 1 * 2)):
-        found = np.mean((left - left.mean()) * (right - right.mean()))
-        assert abs(found - cov) < SIGMA * np.sqrt((product + cov**2) / left.size)
-    # independent of one another and in time
-    for left, right in (
-        (v1, w[0][:-1]),
-        (v1[1:], v1[:-1]),
-        (w[1][1:], w[1][:-1]),
-        (v1, x[:-1, :, 0]),
-    ):
-        assert abs(np.corrcoef(left.ravel(), right.ravel())[0, 1]) < SIGMA / np.sqrt(left.size)
-
-
 def test_the_prior_is_drawn_as_given(vector):
-    x, n = simulate(vector, 20_000, 1, seed=5).x[0], 20_000
-    np.testing.assert_allclose(x.mean(axis=0), [1, -2], rtol=0, atol=SIGMA * np.sqrt(2 / n))
-    found, cov = np.cov(x.T), vector.prior.cov
-    # Var of a sample covariance of Gaussians
-    error = np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / n)
-    assert (abs(found - cov) < SIGMA * error).all()
-
-
-def test_variant_53_decays_as_the_page_says(variant53):
-    # Var x_k = (c^2 + e^2)^k; x is heavy-tailed, so the standard error is taken from the sample
-    # itself.
-    squares = simulate(variant53, 20_000, 12, seed=2).x[..., 0] ** 2
-    expected = (0.9**2 + 0.05**2) ** np.arange(12)
-    assert (
-        abs(squares.mean(axis=1) - expected) < SIGMA * squares.std(axis=1) / np.sqrt(20_000)
-    ).all()
+    oracles.has_moments(simulate(vector, 20_000, 1, seed=5).x[0], *vector.prior)
 
 
 def test_the_seed_decides_the_trajectories(variant53):
@@ -115,31 +72,6 @@ def test_ensembles_side_by_side_are_those_alone(variant53):
 # ---------------------------------------------------------------- run
 
 
-@pytest.mark.parametrize("kind", ["variant53", "vector"])
-def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(kind, request):
-    model = request.getfixturevalue(kind)
-    y = simulate(model, 30, 10, seed=1).y
-    for build in (gaussian, linearised):
-        together = run(aof(build(model)), y)
-        for i in (0, 29):
-            alone = run(aof(build(model)), y[:, i : i + 1])
-            # the library's matrix products may add in another order: a few roundings a step
-            np.testing.assert_allclose(
-                alone.mean[:, 0], together.mean[:, i], rtol=1e-12, atol=1e-14
-            )
-            np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, i], rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.parametrize("kind", ["variant53", "vector"])
-def test_measurements_of_another_size_are_refused(kind, request):
-    model = request.getfixturevalue(kind)
-    for build in (lambda m: aof(linearised(m)), lambda m: aof(gaussian(m))):
-        with pytest.raises(
-            ValueError, match=rf"expects {model.p} measurement component\(s\), got 3"
-        ):
-            run(build(model), np.zeros((4, 5, 3)))
-
-
 # ---------------------------------------------------------------- compare
 
 
@@ -159,16 +91,6 @@ def test_the_number_of_jobs_changes_nothing(variant53, runs):
     for other in results[1:]:
         for first, second in zip(numbers(results[0]), numbers(other), strict=True):
             np.testing.assert_array_equal(first, second)
-
-
-def test_the_seed_changes_everything(variant53):
-    first, second = (
-        compare([aof(gaussian(variant53))], variant53, 100, 3, seed=seed, progress=False)
-        for seed in (1, 2)
-    )
-    assert (
-        first.error_variance("aof-gaussian").value != second.error_variance("aof-gaussian").value
-    ).all()
 
 
 def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):

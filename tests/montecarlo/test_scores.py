@@ -96,41 +96,6 @@ def test_a_slow_loop():
     assert whole.value == pytest.approx(compared.crps("duof").value[1:].mean())
 
 
-def expected_scores(model, steps):
-    """-ln sqrt(2 pi e F), and sqrt(F / pi): what a filter that is right has."""
-    filter_ = kalman_filter(model)
-    F = [
-        linearised(model).at(k).measure(*state.predicted).F.item()
-        for k, state in enumerate(states(filter_, np.zeros((steps, 1, 1)))[:-1])
-    ]
-    return -0.5 * np.log(2 * np.pi * np.e * np.array(F)), np.sqrt(np.array(F) / np.pi)
-
-
-def test_the_scores_of_kalmans_filter_and_their_intervals():
-    model, steps = linear(), 6
-    wanted = expected_scores(model, steps)
-    inside = np.zeros((2, steps))
-    for seed in range(40):
-        compared = compare(
-            [kalman_filter(model)], model, 400, steps, seed, scores=linearised(model)
-        )
-        for i, score in enumerate((compared.log_score("kalman"), compared.crps("kalman"))):
-            low, high = score.interval()
-            inside[i] += (low <= wanted[i]) & (wanted[i] <= high)
-    # 240 intervals of 95 % each, six of a seed together: fewer than 212 in one case of thousands
-    assert (inside.sum(axis=1) >= 0.88 * 40 * steps).all() and inside.sum() < 480
-
-
-def test_who_is_wrong_about_its_doubt_loses():
-    model = linear()
-    sure = linear(meter_noise={"variance": 0.1})
-    filters = [kalman_filter(model), aof(linearised(sure))]
-    compared = compare(filters, model, 2000, 5, seed=2, scores=linearised(model))
-    for score, sign in ((compared.log_score, 1), (compared.crps, -1)):
-        more = score("kalman", minus="aof-linearised", steps=slice(1, None))
-        assert sign * more.value > 4 * more.standard_error
-
-
 def test_the_exact_filter_has_the_most():
     model = Model.define("0.9*x + 0.5*v", "x + 0.4*x**2 + 0.5*w")
     filters = [pointmass(model), aof(gaussian(model))]

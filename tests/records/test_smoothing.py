@@ -109,16 +109,6 @@ def test_the_pendulum_s_smoothers_have_their_published_errors(name, build):
     )
 
 
-@pytest.fixture(scope="module")
-def curved() -> Model:
-    """Object and meter curved, the object's noise multiplied by the state."""
-    return Model.define(
-        ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + (0.3 + 0.1*x1**2)*v2"],
-        ["x1**2/2 + x2 + 0.3*w"],
-        prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
-    )
-
-
 def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
     model = Model.define(
         ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + 0.3*v2"], ["x1**2/2 + x2 + 0.3*w1"],
@@ -202,26 +192,38 @@ def test_angles_go_the_short_way_round_in_the_past_too():
 # ---------------------------------------------------------------- what is refused
 
 
-@pytest.mark.parametrize("lag", [-1, 1.5, True, "2", float("nan")])
-def test_a_lag_that_is_no_number_of_steps_is_refused(curved, lag):
-    with pytest.raises(ValueError, match="lag must be a whole number of steps, at least 0"):
-        smooth(aof(linearised(curved)), np.zeros((3, 1, 1)), lag=lag)
+SCALAR = Model.define("0.9*x + v", "x + w")
 
 
-@pytest.mark.parametrize("rounds", [0, -1, 1.5, True, None])
-def test_rounds_that_are_no_number_of_rounds_are_refused(curved, rounds):
-    with pytest.raises(ValueError, match="rounds must be a whole number, at least 1"):
-        smooth_iterated(linearised(curved), np.zeros((3, 1, 1)), rounds=rounds)
-
-
-def test_a_filter_whose_laws_are_not_normal_cannot_look_back(curved):
-    model = Model.define("0.9*x + v", "x + w")
-    (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1))
-    for one in (designed, imm([linearised(model)], [[1.0]])):
-        with pytest.raises(
-            ValueError,
-            match=rf"looking back needs the structural functions.*{one.name} has none.*take one",
-        ):
-            smooth(one, np.zeros((3, 1, 1)))
-    with pytest.raises(ValueError, match="measurements must have the shape"):
-        smooth(aof(linearised(model)), np.zeros((3, 2)))
+@pytest.mark.parametrize(
+    ("call", "problem"),
+    [
+        *(
+            (
+                lambda lag=lag: smooth(aof(linearised(SCALAR)), np.zeros(3), lag=lag),
+                "lag must be a whole number of steps, at least 0",
+            )
+            for lag in (-1, 1.5, True, "2", np.nan)
+        ),
+        *(
+            (
+                lambda rounds=rounds: smooth_iterated(linearised(SCALAR), np.zeros(3), rounds),
+                "rounds must be a whole number, at least 1",
+            )
+            for rounds in (0, -1, 1.5, True, None)
+        ),
+        (
+            lambda: smooth(imm([linearised(SCALAR)], [[1.0]]), np.zeros(3)),
+            "looking back needs the structural functions.*imm has none.*take one",
+        ),
+        (
+            lambda: smooth(
+                design([duof(SCALAR)], Ensemble(SCALAR, 100, 3, seed=1))[0], np.zeros(3)
+            ),
+            "looking back needs the structural functions.*duof has none.*take one",
+        ),
+    ],
+)
+def test_what_cannot_be_smoothed_is_refused(call, problem):
+    with pytest.raises(ValueError, match=problem):
+        call()

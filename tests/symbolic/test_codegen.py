@@ -33,6 +33,7 @@ EXPRESSIONS = [
     sp.sqrt(2 + sp.sqrt(3)) * x1 + sp.Rational(1, 3) * sp.pi,
     2 ** sp.Rational(1, 4) * x1,
     sp.cot(x1) + sp.sec(x2),
+    sp.Max(x1, x2, 1, x1 * x2) - sp.Min(x1, x2, 1, x1 * x2),
     sp.sign(x1) * x2 + sp.Piecewise((x1, x2 > 0), (p11, True)),
     sp.Float(0.1) * x1 + sp.Float(1e-20) * x2,
 ]
@@ -51,20 +52,11 @@ def reference(expression, x, p):
     )
 
 
-@pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
-def test_generated_code_equals_lambdify(expression, ensemble):
-    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix([expression])}, ["x", "value"])
-    found = code.function(*ensemble)[0]
-    assert found.shape == (50, 1)
-    # A few roundings each; the conditioning of these expressions at these points is below 1e3.
-    np.testing.assert_allclose(
-        found[:, 0], reference(expression, *ensemble), rtol=1e-12, atol=1e-12
-    )
-
-
 def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
+    """By SymPy's own NumPy code for one expression; the conditioning of these at these points is
+    below 1e3."""
     count = len(EXPRESSIONS) // 2
-    together = sp.Matrix(count, 2, EXPRESSIONS[: 2 * count])
+    together = sp.Matrix(count, 2, EXPRESSIONS)
     found = compile_function(
         "f", ARGUMENTS, {"value": together, "first": together[:, 0]}, ["x", "first"]
     ).function(*ensemble)
@@ -75,13 +67,6 @@ def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
             np.testing.assert_allclose(
                 found[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12
             )
-
-
-def test_small_integer_powers_are_products():
-    code = compile_function(
-        "f", ARGUMENTS, {"value": sp.Matrix([x1**2 - 3 * x2**7 / 5, p11**-3 * x1])}, ["x", "value"]
-    )
-    assert "**" not in code.source.replace("**(-1.0)", "")  # a reciprocal is quick
 
 
 def test_what_models_share_is_compiled_once():
@@ -104,18 +89,6 @@ def test_leading_axes_broadcast(ensemble):
     np.testing.assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
     np.testing.assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
     np.testing.assert_array_equal(code(x[3], p[0])[0], expected[3])  # no leading axes at all
-
-
-def test_one_trajectory_gets_the_numbers_it_gets_in_an_ensemble(ensemble):
-    x, p = ensemble
-    code = compile_function(
-        "f", ARGUMENTS, {"value": sp.Matrix(EXPRESSIONS[:4])}, ["x", "value"]
-    ).function
-    for i in (0, 17):
-        # numpy's vectorised sine and exponential may differ from their scalar loops in the last bit
-        np.testing.assert_allclose(
-            code(x[i : i + 1], p[i : i + 1])[0], code(x, p)[0][i : i + 1], rtol=1e-14
-        )
 
 
 @pytest.mark.parametrize(
@@ -172,14 +145,6 @@ def compiled(*expressions):
     return compile_function(
         "f", {"x": sp.Matrix([x, y])}, {"o": sp.Matrix(expressions)}, ["x", "o"]
     )
-
-
-def test_largest_and_smallest_of_many():
-    x, y = symbol("x"), symbol("y")
-    points = np.array([[1.0, 2.0], [-3.0, 0.5], [7.0, -8.0]])
-    found = compiled(sp.Max(x, y, 1, x * y), sp.Min(x, y, 1, x * y)).function(points)[0]
-    each = [[a, b, 1, a * b] for a, b in points]
-    np.testing.assert_array_equal(found, [[max(one), min(one)] for one in each])
 
 
 def test_special_functions_are_scipys():

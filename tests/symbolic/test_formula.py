@@ -150,6 +150,10 @@ HOSTILE = [
     ("((10**16)**16)**16", 1),
     ("x + (x**16)**16", 4),
     ("x + exp(exp(exp(9)))", 8),
+    ("x + atan2(x, v, v)", 4),
+    ("atan2()", 0),
+    ("atan2(x, v=1)", 0),
+    ("atan2(x, 10**3)", 0),
 ]
 
 
@@ -175,6 +179,7 @@ NO_VALUE = [
     "sqrt(-4*x**2)",
     "x*(-8)**(1/3)",
     "x*(-1)**0.5",
+    "atan2(0, 0)",
 ]
 NO_END = ["x" * 10_000, "x + " * 3000 + "x", "(" * 300 + "x" + ")" * 300, "-" * 1900 + "x"]
 NO_FORMULA = ["", "   ", "\n", "x + ", "*x", "\0", "x + \0"]
@@ -202,6 +207,7 @@ def test_only_strings_are_read(formula):
         ("(10**15)**2*x", "(10**16)**2*x", "too large or too small"),
         ("(1/10**15)**2*x", "(1/10**16)**2*x", "too large or too small"),
         ("sin(" * 5 + "x" + ")" * 5, "sin(" * 6 + "x" + ")" * 6, "more than 5 deep"),
+        ("atan2(x, " * 5 + "x" + ")" * 5, "atan2(x, " * 6 + "x" + ")" * 6, "more than 5 deep"),
         ("exp(499)*x", "exp(500)*x", "argument of exp is too large"),
         ("1e99*x", "1e100*x", "number is too large or too small"),
         ("sin(x)", "sin(x, v)", "sin takes exactly one argument"),

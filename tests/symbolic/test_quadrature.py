@@ -5,17 +5,14 @@ import warnings
 
 import numpy as np
 import pytest
-import scipy
 
 from kfcourse import Model, gaussian, likelihood, linearised, run, simulate
 from kfcourse.filters.approximations import aof
 from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
-from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.quadrature import (
     QuadratureWarning,
     axes,
     gauss_hermite,
-    product_rule,
     unscented,
 )
 
@@ -36,84 +33,7 @@ def test_the_pendulum_has_its_published_errors(structure, published):
     assert rms == pytest.approx(published, rel=1e-12)
 
 
-def two_states(state_noise_factor="1"):
-    return Model.define(
-        ["0.9*x1 + 0.2*sin(x2) + v1", f"0.8*x2 + {state_noise_factor}*v2 + 0.5*v1"],
-        ["x1*x2 + w1 + 2*w2", "x2 + 0.3*x1*w3"],
-        prior={"mean": [0.5, -0.4], "variance": [[0.4, 0.1], [0.1, 0.3]]},
-        state_noise={"mean": [0.1, 0.2], "variance": [[0.5, 0.2], [0.2, 0.4]]},
-        meter_noise={
-            "mean": [0.3, -0.1, 0.2],
-            "variance": [[0.3, 0.1, 0], [0.1, 0.2, 0.05], [0, 0.05, 0.4]],
-        },
-    )
-
-
-@pytest.mark.parametrize("factor", ["1", "x1"])
-def test_added_noise_apart_is_added_noise_among_the_points(factor):
-    """By Gauss-Hermite, against points for the state and all noises; w2 is only added, but
-    correlated with w3, which is not."""
-    model = two_states(factor)
-    structure = gauss_hermite(model, 6)
-    mean, cov = model.prior.mean + 0.3, 2 * model.prior.cov
-    state, meter = compile_model(model)
-    for equation, noise, law in (
-        (state, model.state_noise, structure.predict(mean, cov)),
-        (meter, model.meter_noise, structure.measure(mean, cov)),
-    ):
-        points, weights = product_rule(6)(2 + len(noise.mean))
-        joint = (
-            points
-            @ scipy.linalg.block_diag(np.linalg.cholesky(cov), np.linalg.cholesky(noise.cov)).T
-        )
-        values = equation(mean + joint[:, :2], noise.mean + joint[:, 2:])
-        centre = weights @ values
-        spread = (values - centre).T @ ((values - centre) * weights[:, None])
-        found_mean, found_cov = (law.mean, law.cov) if len(law) == 2 else (law.h, law.F)
-        # the sine by 6 points, over another number of axes
-        np.testing.assert_allclose(found_mean, centre, rtol=1e-6)
-        np.testing.assert_allclose(found_cov, spread, rtol=1e-6, atol=1e-14)
-
-
 # --- what does not vary
-
-
-def ungm(time_is_a_state):
-    x, noise = (["x1/2 + 25*x1/(1 + x1**2) + 8*cos(1.2*x2) + v1", "x2 + 1"], "x1**2/20 + w1")
-    if time_is_a_state:
-        return Model.define(
-            x, noise, prior={"mean": [0, 0], "variance": [5.0, 0.0]}, state_noise={"variance": 10}
-        )
-    return Model.define(
-        "x/2 + 25*x/(1 + x**2) + v",
-        "x**2/20 + w",
-        prior={"variance": 5},
-        state_noise={"variance": 10},
-    )
-
-
-@pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
-@pytest.mark.parametrize("kind", [lambda m: unscented(m), lambda m: gauss_hermite(m, 6)])
-def test_time_as_a_state_changes_nothing(kind):
-    """The growth model: the filter of the scalar model, moved by 8 cos 1.2 k from outside, is the
-    same to rounding."""
-    model, scalar = ungm(True), kind(ungm(False))
-    y = simulate(model, 20, 40, seed=1).y
-    found = run(aof(kind(model)), y)
-    assert not found.cov[..., 1, :].any()  # time has no variance, not even one of rounding
-    one, state = aof(scalar), aof(scalar).init(20)
-    for k in range(40):
-        state = one.step(state, y[k])
-        # errors of rounding grow where the filter doubts between x and -x: to some 1e-9 in these 40
-        # steps
-        np.testing.assert_allclose(found.mean[k, :, :1], state.posterior.mean, rtol=1e-7, atol=1e-7)
-        np.testing.assert_allclose(
-            found.cov[k, :, :1, :1], state.posterior.cov, rtol=1e-7, atol=1e-7
-        )
-        predicted = state.predicted
-        state = state._replace(
-            predicted=predicted._replace(mean=predicted.mean + 8 * np.cos(1.2 * k))
-        )
 
 
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
@@ -222,18 +142,6 @@ def test_where_the_points_do_nothing_is_said(kind, term):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         kind(Model.define(f"{term} + v", "x + w", prior={"variance": 0.5}))
-
-
-def test_on_variant_53_the_unscented_filter_is_the_extended_one(variant53):
-    """The points lie on the axes: off the mean either x or the noise moves, so of x^2 w and x v
-    they see the tangents."""
-    y = simulate(variant53, 50, 30, seed=1).y
-    by_points, by_tangent = run(aof(unscented(variant53)), y), run(aof(linearised(variant53)), y)
-    # 30 steps of a stable recursion
-    np.testing.assert_allclose(by_points.mean, by_tangent.mean, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(by_points.cov, by_tangent.cov, rtol=1e-12, atol=1e-14)
-    exact = run(aof(gaussian(variant53)), y)
-    assert np.abs(exact.cov - by_points.cov).max() > 1e-4  # not for want of anything to see
 
 
 @pytest.mark.parametrize("kind", [gauss_hermite, unscented])
