@@ -69,8 +69,8 @@ def execute(chapter: Path) -> Executed:
     except (DeadKernelError, RuntimeError) as error:  # RuntimeError: no kernel starts
         return Executed(chapter, notebook, 0.0, f"{type(error).__name__}: {error}")
     traceback = done.exc_string
-    if not traceback and (found := first_error(done.nb)):
-        cell, shown = found
+    if not traceback and (error_ := first_error(done.nb)):
+        cell, shown = error_
         traceback = f"{cell.source}\n\n{shown.ename}: {shown.evalue}"
     return Executed(chapter, done.nb, done.time, traceback)
 

@@ -27,21 +27,21 @@ class Part(NamedTuple):
 def parts(env: BuildEnvironment) -> list[Part]:
     """The parts in the order of `_toc.yml`: a page's title there is its short one; without it, its
     heading."""
-    found = []
+    result = []
     for tree in env.get_doctree(env.config.root_doc).findall(addnodes.toctree):
         pages = [
             Page(name, title or env.titles[name].astext(), _number(env, name))
             for title, name in tree["entries"]
         ]
-        found.append(Part(tree.get("caption") or "", pages))
-    return found
+        result.append(Part(tree.get("caption") or "", pages))
+    return result
 
 
 def page(env: BuildEnvironment, name: str) -> tuple[Part, Page] | None:
     """The page of this name and the part it stands in; None if the table of contents does not have
     it."""
     return next(
-        ((part, one) for part in parts(env) for one in part.pages if one.name == name), None
+        ((part, entry) for part in parts(env) for entry in part.pages if entry.name == name), None
     )
 
 

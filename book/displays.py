@@ -32,16 +32,18 @@ def say(app, doctree) -> None:
     app.env.note_dependency(str(letters_file(page)))
     for display in list(doctree.findall(nodes.math_block)):
         if not _made(display):
-            said = _judged(
+            relations = _judged(
                 letters, Formula("display", display.astext(), display.get("label") or ""), display
             )
-            _below(display, mark(said))
+            _below(display, mark(relations))
     for box in list(doctree.findall(nodes.Admonition)):
         if BOXES & set(box.get("classes", [])):
-            formulas = (Formula("box", one.astext()) for one in box.findall(nodes.math))
-            said = [one for formula in formulas for one in _judged(letters, formula, box)]
-            if said:
-                box += _words(_counted(said))
+            formulas = (Formula("box", math.astext()) for math in box.findall(nodes.math))
+            relations = [
+                relation for formula in formulas for relation in _judged(letters, formula, box)
+            ]
+            if relations:
+                box += _words(_counted(relations))
 
 
 def _made(node: nodes.Node) -> bool:
@@ -71,10 +73,10 @@ def _words(words: str) -> nodes.paragraph:
     )
 
 
-def _counted(said: list[Said]) -> str:
+def _counted(relations: list[Said]) -> str:
     """How many relations of a box are computed, and what the others are."""
-    computed = sum(one.computed for one in said)
-    others = Counter(one.what for one in said if not one.computed)
+    computed = sum(relation.computed for relation in relations)
+    others = Counter(relation.what for relation in relations if not relation.computed)
     parts = [f"✓ {computed} relations computed"] if computed else []
     return "; ".join([*parts, *(f"{what}: {count}" for what, count in others.items())])
 

@@ -62,25 +62,32 @@ def pages(chapters: Iterable[tuple[str, list[dict]]]) -> dict[str, str]:
     for document, made in chapters:
         typed = list(judged(BOOK / f"{document}.md"))
         relations = [
-            one for formula, said in typed if formula.kind in ("display", "box") for one in said
+            relation
+            for formula, judged_ in typed
+            if formula.kind in ("display", "box")
+            for relation in judged_
         ]
         here = Counter(
-            total=sum(one.get("equations", 0) for one in made),
-            claims=sum("sentence" in one for one in made),
-            computed=sum(one.computed for one in relations),
-            others=sum(not one.computed for one in relations)
-            + sum("how" in one and not one["equations"] for one in made),
+            total=sum(record.get("equations", 0) for record in made),
+            claims=sum("sentence" in record for record in made),
+            computed=sum(relation.computed for relation in relations),
+            others=sum(not relation.computed for relation in relations)
+            + sum("how" in record and not record["equations"] for record in made),
         )
         counted += here + Counter(chapters=bool(here["total"]))
         shown = [
-            _entry(one["latex"], one["label"], ("✓ " if one["equations"] else "") + one["how"])
-            for one in made
-            if "how" in one
+            _entry(
+                record["latex"],
+                record["label"],
+                ("✓ " if record["equations"] else "") + record["how"],
+            )
+            for record in made
+            if "how" in record
         ]
         shown += [
-            _entry(formula.latex, formula.label, mark(said))
-            for formula, said in typed
-            if formula.kind == "display" and said
+            _entry(formula.latex, formula.label, mark(judged_))
+            for formula, judged_ in typed
+            if formula.kind == "display" and judged_
         ]
         if shown:
             parts[page_of(document)] += [

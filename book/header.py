@@ -91,7 +91,7 @@ def _items(app, name: str, line: chapter_line):
     if executed.exists():
         notebook = nbformat.read(executed, as_version=4)
         yield embedded(f"{name}.ipynb", nbformat.writes(plain(notebook)).encode(), "↓ notebook")
-        count = sum(one["equations"] for one in records(notebook))
+        count = sum(record["equations"] for record in records(notebook))
         place = f"{app.builder.get_relative_uri(name, page_of(name))}#{place_of(name)}"
         yield (
             count
@@ -101,12 +101,12 @@ def _items(app, name: str, line: chapter_line):
 
 
 def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str:
-    found = contents.page(app.env, other)
-    if found is None:
+    place = contents.page(app.env, other)
+    if place is None:
         log.warning("no page %r in _toc.yml", other, location=line)
         return html.escape(other)
     address = app.builder.get_relative_uri(name, other)
-    return f'<a href="{address}">{html.escape(text or found[1].title)}</a>'
+    return f'<a href="{address}">{html.escape(text or place[1].title)}</a>'
 
 
 def _words(text: str) -> list[str]:

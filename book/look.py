@@ -55,10 +55,10 @@ class InPlace(SphinxPostTransform):
             name: figure for figure in self.document.findall(nodes.figure) for name in figure["ids"]
         }
         for live in list(self.document.findall(nodes.raw)):
-            if (found := LIVE.search(live.astext())) and found[1] in figures:
+            if (match := LIVE.search(live.astext())) and match[1] in figures:
                 output = live.parent
                 output.remove(live)
-                figures[found[1]].insert(1, live)
+                figures[match[1]].insert(1, live)
                 if not output.children:
                     output.parent.parent.remove(output.parent)
 

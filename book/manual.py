@@ -49,17 +49,17 @@ def write() -> None:
             render(read(job.letter), exercise(job.letter, VARIANT)),
             nbformat.read(job.target, as_version=4),
         )
-        found = pictures(executed)
-        for name, png in found.items():
+        images = pictures(executed)
+        for name, png in images.items():
             (PAGES / f"{name}.png").write_bytes(png)
         file = sets()[job.letter].name
         heading, rest = statement(
-            notebook, {name: (f"{name}.png", shown_width(png)) for name, png in found.items()}
+            notebook, {name: (f"{name}.png", shown_width(png)) for name, png in images.items()}
         ).split("\n", 1)
         (PAGES / f"{file}.md").write_text(
             f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8"
         )
-        nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")
+        nbformat.write(student(notebook, images), PAGES / "notebooks" / f"{file}.ipynb")
 
 
 def shown_width(png: bytes) -> int:
@@ -70,9 +70,9 @@ def shown_width(png: bytes) -> int:
 def table() -> str:
     """The sets and the chapters that they belong to, in Markdown."""
     rows = [
-        f"| {letter}: {{doc}}`{one.title} <manual/{one.name}>` | "
-        f"{', '.join(f'{{doc}}`{chapter}`' for chapter in one.chapters)} |"
-        for letter, one in sets().items()
+        f"| {letter}: {{doc}}`{set_.title} <manual/{set_.name}>` | "
+        f"{', '.join(f'{{doc}}`{chapter}`' for chapter in set_.chapters)} |"
+        for letter, set_ in sets().items()
     ]
     return "\n".join(["| set | chapters |", "| --- | --- |", *rows, ""])
 
@@ -80,12 +80,12 @@ def table() -> str:
 def variants() -> str:
     """The shipped variants without modes, with their equations, in Markdown."""
     rows = []
-    for name, one in load_variants().items():
+    for name, variant in load_variants().items():
         state, meter = (
             ", ".join(map(sp.latex, side))
-            for side in (one.model.state_equation, one.model.meter_equation)
+            for side in (variant.model.state_equation, variant.model.meter_equation)
         )
-        rows.append(f"| {name} | ${state}$ | ${meter}$ | {one.title} |")
+        rows.append(f"| {name} | ${state}$ | ${meter}$ | {variant.title} |")
     return "\n".join(
         ["| variant | $x_{k+1}=$ | $y_k=$ | what it is |", "| --- | --- | --- | --- |", *rows, ""]
     )

@@ -31,7 +31,7 @@ def write(app, exception: Exception | None) -> None:
     read = cache(lambda name: (root / name).read_text(encoding="utf-8"))
     for path in sorted(root.rglob("*.html")):
         name, text = path.relative_to(root).as_posix(), path.read_text(encoding="utf-8")
-        here, found = posixpath.dirname(name) or ".", {}
+        here, previews = posixpath.dirname(name) or ".", {}
         for place in (PLACE.search(link[0]) for link in LINK.finditer(text) if name not in REPEAT):
             target = place and posixpath.normpath(posixpath.join(here, place[1]))
             if not target or not (root / target).exists():
@@ -42,9 +42,9 @@ def write(app, exception: Exception | None) -> None:
                 posixpath.relpath(posixpath.dirname(target) or ".", here),
             )
             if shown:
-                found[f"{place[1]}#{place[2]}"] = shown
-        if found:
-            data = json.dumps(found, ensure_ascii=False, separators=(",", ":")).replace(
+                previews[f"{place[1]}#{place[2]}"] = shown
+        if previews:
+            data = json.dumps(previews, ensure_ascii=False, separators=(",", ":")).replace(
                 "<", "\\u003c"
             )
             script = f'<script type="application/json" id="kf-previews">{data}</script>\n</body>'

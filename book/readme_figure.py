@@ -80,5 +80,5 @@ PICTURE.write_text(text + "\n", encoding="utf-8")
 
 e = float(model.parameters["e"])
 grid = {"e": (e,), "f": tuple(round(e * ratio, 6) for ratio in RATIOS)}
-found = parameter_map(model, grid, steps=STEPS.stop, runs=20_000)
-MAP.write_text(json.dumps(leading(found), separators=(",", ":")) + "\n", encoding="utf-8")
+cells = parameter_map(model, grid, steps=STEPS.stop, runs=20_000)
+MAP.write_text(json.dumps(leading(cells), separators=(",", ":")) + "\n", encoding="utf-8")

@@ -15,8 +15,8 @@ ARGUMENTS = ["lab", "53", "--report", "ru", "--runs", "20000", "--steps", "21"]
 
 def write() -> None:
     """Write the report, if it is not there."""
-    said = REPORT / "said.txt"
-    if said.exists():
+    printed = REPORT / "printed.txt"
+    if printed.exists():
         return
     print("Sample report ...", flush=True)
     shutil.rmtree(FOLDER, ignore_errors=True)
@@ -28,4 +28,6 @@ def write() -> None:
         if path.suffix == ".pdf":
             path.unlink()
     lines = [line for line in done.stdout.splitlines() if str(REPORT) not in line]
-    said.write_text("\n".join([f"$ kfcourse {' '.join(ARGUMENTS)}", *lines, ""]), encoding="utf-8")
+    printed.write_text(
+        "\n".join([f"$ kfcourse {' '.join(ARGUMENTS)}", *lines, ""]), encoding="utf-8"
+    )

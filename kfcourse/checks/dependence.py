@@ -48,7 +48,7 @@ class Sensitivity:
     def called(self, place: int, change: Callable[[Any], Any]) -> list[tuple[list[Any], list[Any]]]:
         """Parts of the right result and of the student's for each call, with the argument changed;
         none if it cannot be."""
-        found = []
+        pairs = []
         for arguments in self.arguments[:CALLS]:
             try:
                 other = change(arguments[place])
@@ -56,15 +56,15 @@ class Sensitivity:
                 # not into LAPACK, which complains on the terminal
                 with np.errstate(divide="raise", invalid="raise"):
                     right, mine = (
-                        [np.asarray(part, float) for part in self._parts(one, values)]
-                        for one in self.answers
+                        [np.asarray(part, float) for part in self._parts(answer, values)]
+                        for answer in self.answers
                     )
             except (OutOfTime, KeyboardInterrupt):
                 raise
             except BaseException:  # as above
                 return []
-            found.append((right, mine))
-        return found
+            pairs.append((right, mine))
+        return pairs
 
     def unused(self, part: int) -> list[str]:
         """Arguments that the part should depend on and does not."""
@@ -115,12 +115,12 @@ def nudged(value: Any, which: int) -> Any:
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
         return [value + 1, value + 2, value + 3, 2 * value + 1, 3 * value + 2][which]
     if callable(value):  # a factor alone may cancel: a regression on it is the same
-        return changed(value, [lambda one: 1.05 * one + 0.01 * one**2][which])
+        return changed(value, [lambda entry: 1.05 * entry + 0.01 * entry**2][which])
     factor: Any = [np.linspace(1.03, 1.07, np.size(value)).reshape(np.shape(value)), 0.9][which]
     if np.ndim(value) >= 2 and value.shape[-1] == value.shape[-2]:
         scale = 1.03 + 0.01 * np.arange(value.shape[-1])
         factor = scale[:, None] * scale
-    return changed(value, lambda one: one * factor)
+    return changed(value, lambda entry: entry * factor)
 
 
 def same(first: Any, second: Any) -> bool:
@@ -132,7 +132,7 @@ def same(first: Any, second: Any) -> bool:
 
 def scaled(value: Any, factor: float) -> Any:
     """A hidden argument times a factor: a number, an array, or a function with such results."""
-    return changed(value, lambda one: factor * one)
+    return changed(value, lambda entry: factor * entry)
 
 
 def changed(value: Any, change: Callable[[Any], Any]) -> Any:

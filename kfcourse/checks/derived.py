@@ -86,7 +86,7 @@ class Posed:
             return rf"$x\sim\mathcal N({law.means[0]},{law.cov[0][0]})$"
         entries = dict.fromkeys(entry for row in law.cov for entry in row)
         states, means, covs = (
-            ", ".join(f"`{one}`" for one in names) for names in (law.states, law.means, entries)
+            ", ".join(f"`{name}`" for name in names) for names in (law.states, law.means, entries)
         )
         return f"the normal law of {states}, with the means {means} and the covariances {covs},"
 
@@ -132,7 +132,12 @@ class Derivation(Question):
         posed = self.posed(exercise)
         report, chain = _read(posed, text)
         slip = next(
-            (one for one in report.verdicts if one.status in (DIFFERS, UNREADABLE, UNDECIDED)), None
+            (
+                verdict
+                for verdict in report.verdicts
+                if verdict.status in (DIFFERS, UNREADABLE, UNDECIDED)
+            ),
+            None,
         )
         right, steps = _counted(report, posed.name)
         tree = _last(chain)
@@ -184,13 +189,13 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
     except DerivationError as error:
         raise Unusable(" ".join(str(error).split())) from None
     law = posed.setting.law
-    for one in report.chains:
-        if one.name in {*law.random, *law.letters, *posed.ends}:
+    for chain in report.chains:
+        if chain.name in {*law.random, *law.letters, *posed.ends}:
             raise Unusable(
-                f"a chain begins with `{one.name} =`, which has a meaning already; derive "
+                f"a chain begins with `{chain.name} =`, which has a meaning already; derive "
                 f"`{posed.name}`"
             )
-    chains = [one for one in report.chains if one.name == posed.name]
+    chains = [chain for chain in report.chains if chain.name == posed.name]
     if len(chains) != 1:
         raise Unusable(
             f"{len(chains) or 'no'} chain{'s' * (len(chains) != 1)} with `{posed.name}` at the "
@@ -216,16 +221,16 @@ def _counted(report: Report, name: str) -> tuple[int, int]:
     right = steps = 0
     for chain in report.chains:
         above = ""
-        for one in chain.verdicts:
-            same, above = one.text == above, one.text
+        for verdict in chain.verdicts:
+            same, above = verdict.text == above, verdict.text
             if (
-                one.status == BEGINS
+                verdict.status == BEGINS
                 or same
-                or ((tree := _tree(one.text)) is not None and name in letters(tree))
+                or ((tree := _tree(verdict.text)) is not None and name in letters(tree))
             ):
                 continue
             steps += 1
-            right += one.status in (RIGHT, FOLLOWS, AGAIN)
+            right += verdict.status in (RIGHT, FOLLOWS, AGAIN)
     return right, steps
 
 
@@ -233,7 +238,7 @@ def _open(posed: Posed, tree: Node | None) -> str:
     """What is still to be done after the last line; nothing if it is an end."""
     if tree is None:
         return "The last line cannot be read."
-    if any(one.kind == MEAN for _, one in walk(tree)):
+    if any(inner.kind == MEAN for _, inner in walk(tree)):
         return "In the last line a mean is still to be taken: go on until none is left."
     left = sorted(letters(tree) - posed.ends)
     if left:
@@ -253,8 +258,8 @@ def _is(posed: Posed, tree: Node) -> bool:
 
 
 def _not_shown(posed: Posed, chain: Derived) -> str:
-    trees = [tree for one in chain.verdicts if (tree := _tree(one.text)) is not None]
-    if posed.averages and not any(one.kind == MEAN for tree in trees for _, one in walk(tree)):
+    trees = [tree for verdict in chain.verdicts if (tree := _tree(verdict.text)) is not None]
+    if posed.averages and not any(inner.kind == MEAN for tree in trees for _, inner in walk(tree)):
         return "But a derivation is asked for: begin with a mean M[...], and take a step a line."
     if len({written(tree) for tree in trees}) < posed.fewest:
         return (
@@ -281,9 +286,9 @@ def _words(slip: Verdict) -> str:
 def _says(report: Report, slip: Verdict, right: int, steps: int) -> str:
     """The first line that is wrong, and what stands after it."""
     later: Sequence[Verdict] = report.verdicts[report.verdicts.index(slip) + 1 :]
-    again = [f"line {one.line}" for one in later if one.status == DIFFERS]
+    again = [f"line {verdict.line}" for verdict in later if verdict.status == DIFFERS]
     more = f" There is a slip of its own in {', '.join(again)} too." if again else ""
-    on_top = sum(one.status == FOLLOWS for one in later)
+    on_top = sum(verdict.status == FOLLOWS for verdict in later)
     kept = (
         f" What follows is right on top of it ({on_top} step{'s' * (on_top != 1)})."
         if on_top

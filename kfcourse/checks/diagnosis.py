@@ -31,7 +31,7 @@ class Wrong:
     question: Question
     answers: tuple[Answer, Answer]  # the right one, and the wrong one
     arguments: Sequence[tuple]
-    found: list[Any]
+    answered: list[Any]
     expected: list[Any]
     # mistakes with their results, None where impossible
     known: Sequence[tuple[Mistake, list[Any] | None]]
@@ -41,7 +41,7 @@ class Wrong:
     def parts(self) -> tuple[str, ...]:
         return self.question.parts
 
-    def told(self) -> tuple[str, list[str], bool]:
+    def description(self) -> tuple[str, list[str], bool]:
         """What to say, the names of the mistakes it looks like, and whether that explains the first
         result that is wrong."""
         parts = self.parts
@@ -54,7 +54,7 @@ class Wrong:
         whole = [
             mistake
             for mistake, wrong in self.known
-            if wrong is not None and self.agree(self.found, wrong)
+            if wrong is not None and self.agree(self.answered, wrong)
         ]
         if whole:
             return start + _said(whole), _named(whole), True
@@ -63,20 +63,20 @@ class Wrong:
             return start + (hint or GENERAL), seen, _tells(seen)
         if self._swapped():
             return "not right. All results are right, but in another order.", ["swapped"], True
-        found = [
+        described = [
             (parts[place], *self._diagnosis(place))
             for place in range(len(parts))
             if place not in right
         ]
-        known = [one for one in found if self._known(one[1])]
-        leads = known or [one for one in found if one[2]][:1]
+        known = [description for description in described if self._known(description[1])]
+        leads = known or [description for description in described if description[2]][:1]
         if not leads:
             return start + GENERAL, [], False
         names = list(dict.fromkeys(name for _, seen, _ in leads for name in seen))
-        first, of_first, _ = found[0]
+        first, of_first, _ = described[0]
         hints: dict[str, list[str]] = {}
         rest = []
-        for part, seen, hint in found:
+        for part, seen, hint in described:
             if all(hint != lead for *_, lead in leads):
                 rest.append(part)
                 continue
@@ -95,11 +95,11 @@ class Wrong:
         return any(mistake.name in names for mistake, _ in self.known)
 
     def _agrees(self, place: int, wanted: Sequence[Any]) -> bool:
-        return self.agree(part_of(self.found, place), part_of(wanted, place))
+        return self.agree(part_of(self.answered, place), part_of(wanted, place))
 
     def _swapped(self) -> bool:
         return any(
-            self.agree([tuple(one[i] for i in order) for one in self.found], self.expected)
+            self.agree([tuple(result[i] for i in order) for result in self.answered], self.expected)
             for order in permutations(range(len(self.parts)))
             if list(order) != sorted(order)
         )
@@ -111,7 +111,7 @@ class Wrong:
         def of(results: Sequence[Any]) -> Sequence[Any]:
             return results if place is None else part_of(results, place)
 
-        mine, theirs = of(self.found), of(self.expected)
+        mine, theirs = of(self.answered), of(self.expected)
         possible = [(mistake, wrong) for mistake, wrong in self.known if wrong is not None]
         seen = [(mistake, wrong) for mistake, wrong in possible if self.agree(mine, of(wrong))]
         good = [self.agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
@@ -134,9 +134,9 @@ class Wrong:
         others = [
             (name, part_of(self.expected, i)) for i, name in enumerate(self.parts) if i != place
         ]
-        said = general(
+        hint = general(
             Case(
-                found=mine,
+                answered=mine,
                 expected=theirs,
                 agree=self.agree,
                 arguments=self.arguments,
@@ -147,7 +147,7 @@ class Wrong:
                 axes=self.question.axes,
             )
         )
-        return ([said[0]], said[1]) if said else ([], "")
+        return ([hint[0]], hint[1]) if hint else ([], "")
 
     def _likely(self, seen: Sequence[tuple[Mistake, list[Any]]]) -> list[Mistake]:
         """Those that spoil the fewest results that are right; of these, those that explain the most
@@ -175,8 +175,8 @@ class Wrong:
     def sensitivity(self) -> Sensitivity:
         """To the arguments of the calls."""
         results = [
-            tuple(list(one) if self.parts else [one] for one in pair)
-            for pair in zip(self.expected, self.found, strict=True)
+            tuple(list(result) if self.parts else [result] for result in pair)
+            for pair in zip(self.expected, self.answered, strict=True)
         ]
         return Sensitivity(
             self.names, self.answers, self.arguments, results, bool(self.parts), self.question.spare
@@ -184,17 +184,17 @@ class Wrong:
 
     def case(self, values: Mapping[sp.Symbol, Any]) -> str:
         """One input for which the answer is wrong, and what it gives there."""
-        right = [self.agree([a], [b]) for a, b in zip(self.found, self.expected, strict=True)]
-        size = [sum(np.size(value) for value in one) for one in self.arguments]
+        right = [self.agree([a], [b]) for a, b in zip(self.answered, self.expected, strict=True)]
+        size = [sum(np.size(value) for value in given) for given in self.arguments]
         which = min((i for i, good in enumerate(right) if not good), key=size.__getitem__)
-        mine, theirs = self.found[which], self.expected[which]
+        mine, theirs = self.answered[which], self.expected[which]
         parts = [
             place
             for place in range(len(self.parts))
             if not self.agree([mine[place]], [theirs[place]])
         ]
         place = parts[0] if parts else None
-        mine, theirs = (one if place is None else one[place] for one in (mine, theirs))
+        mine, theirs = (result if place is None else result[place] for result in (mine, theirs))
         what = "" if place is None else self.parts[place]
         return shown(
             self.names, self.arguments[which], mine, theirs, what, self.question.axes, values

@@ -97,20 +97,20 @@ def _built(
 def pieces(key: Answer) -> dict[str, FunctionType]:
     """The key, if it is a plain function, and the functions of the exercises that it calls, by
     name; the key is the first."""
-    found: dict[str, FunctionType] = {}
+    functions: dict[str, FunctionType] = {}
     waiting: list[Callable] = [key]
     while waiting:
         function = waiting.pop(0)
-        if not isinstance(function, FunctionType) or function.__name__ in found:
+        if not isinstance(function, FunctionType) or function.__name__ in functions:
             continue
         if function is key or function.__module__.startswith(SETS):
-            found[function.__name__] = function
+            functions[function.__name__] = function
             waiting += [
                 function.__globals__[name]
                 for name in _names(function.__code__)
                 if name in function.__globals__
             ]
-    return found
+    return functions
 
 
 def uses(key: Answer) -> set[str]:
@@ -182,9 +182,9 @@ def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:
     for letters in (False, True):  # of which there are many
         for name, source in sources.items():
             nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
-            names = sorted({one.arg for one in nodes if isinstance(one, ast.arg)})
-            fixed = [one.iter for one in nodes if isinstance(one, ast.For | ast.comprehension)]
-            left = {id(inner) for one in fixed for inner in ast.walk(one)}
+            names = sorted({node.arg for node in nodes if isinstance(node, ast.arg)})
+            fixed = [node.iter for node in nodes if isinstance(node, ast.For | ast.comprehension)]
+            left = {id(node) for loop in fixed for node in ast.walk(loop)}
             for place, node in enumerate(nodes):
                 if isinstance(node, ast.Name) is letters and id(node) not in left:
                     for number, (kind, _) in enumerate(changes(node, names)):
@@ -202,5 +202,5 @@ def _changed(source: str, place: int, number: int, names: Sequence[str]) -> str:
             if value is old:
                 setattr(parent, field, new)
             elif isinstance(value, list):
-                value[:] = [new if one is old else one for one in value]
+                value[:] = [new if entry is old else entry for entry in value]
     return ast.unparse(ast.fix_missing_locations(tree))

@@ -88,7 +88,7 @@ def call(
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not in_library(error):
             raise Missing from None
-        raise Unusable(f"stops with {told(error)}") from None
+        raise Unusable(f"stops with {in_a_line(error)}") from None
     return results
 
 
@@ -132,7 +132,7 @@ def in_library(error: BaseException) -> bool:
     return _foreign(_frames(error)[-1])
 
 
-def told(error: BaseException) -> str:
+def in_a_line(error: BaseException) -> str:
     """The error in one line, with the student's own line of code."""
     try:
         text = " ".join(str(error).split())[:200]
@@ -183,7 +183,7 @@ def _trouble(error: Exception) -> str:
     frames = [
         f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in _frames(error)
     ]
-    return f"{told(error)} ({' < '.join(reversed(frames[-4:]))})"
+    return f"{in_a_line(error)} ({' < '.join(reversed(frames[-4:]))})"
 
 
 def posed(question: Question, exercise: Exercise) -> Posed:
@@ -265,16 +265,16 @@ class _Check:
 
     def result(self) -> Result:
         try:
-            found = call(self.answer, self.posed.arguments, self.posed.expected, self.seconds)
+            answered = call(self.answer, self.posed.arguments, self.posed.expected, self.seconds)
         except Missing:
             return self._says(MISSING, "not implemented yet")
         except Unusable as reason:
             return self._says(UNUSABLE, str(reason))
         if isinstance(self.question, Derivation):
-            return self._derived(self.question, found)
+            return self._derived(self.question, answered)
         try:
             with time_limit(self.seconds):
-                if self.posed.agree(found, self.posed.expected):
+                if self.posed.agree(answered, self.posed.expected):
                     self.past.given.pop(self.question.name, None)
                     return self._says(PASSED, "right", share=1.0)
         except OutOfTime:
@@ -283,17 +283,17 @@ class _Check:
             )
         try:
             with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
-                return self._wrong(found)
+                return self._wrong(answered)
         except OutOfTime:
             return self._says(WRONG, f"not right. {GENERAL}")
         # of ours: the answer is wrong all the same, only the hint is lost
         except Exception as error:
             return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
 
-    def _derived(self, question: Derivation, found: list[str]) -> Result:
+    def _derived(self, question: Derivation, answered: list[str]) -> Result:
         try:
             with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
-                judged = question.judge(self.exercise, found[0])
+                judged = question.judge(self.exercise, answered[0])
         except Unusable as reason:
             return self._says(UNUSABLE, str(reason))
         except OutOfTime:
@@ -303,45 +303,53 @@ class _Check:
         message = judged.message
         if judged.status == PASSED:
             self.past.given.pop(question.name, None)
-        elif self._times(found) and question.advice:
+        elif self._times(answered) and question.advice:
             message += f" {question.advice}"
         return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
 
-    def _numbers(self, found: list[Any]) -> bool:
+    def _numbers(self, answered: list[Any]) -> bool:
         """Whether all formulas that are wrong lack parameters, and are right with numbers in their
         place."""
-        pairs = zip(_flat(found), _flat(self.posed.expected), strict=True)
-        wrong = [pair for pair in pairs if not self.posed.agree(*([one] for one in pair))]
+        pairs = zip(_flat(answered), _flat(self.posed.expected), strict=True)
+        wrong = [pair for pair in pairs if not self.posed.agree(*([side] for side in pair))]
         names = {s.name for s in self.posed.values}
         return bool(wrong) and all(
             names & {s.name for s in right.free_symbols} - {s.name for s in mine.free_symbols}
-            and self.posed.agree(*([with_values(one, self.posed.values)] for one in (mine, right)))
+            and self.posed.agree(
+                *([with_values(side, self.posed.values)] for side in (mine, right))
+            )
             for mine, right in wrong
         )
 
-    def _wrong(self, found: list[Any]) -> Result:
+    def _wrong(self, answered: list[Any]) -> Result:
         pairs = [
-            (part_of(found, place), part_of(self.posed.expected, place))
+            (part_of(answered, place), part_of(self.posed.expected, place))
             for place in range(len(self.question.parts))
         ]
         right = [1 for mine, theirs in pairs if self.posed.agree(mine, theirs)]
         share = len(right) / len(self.question.parts) if right else 0.0
-        times = self._times(found)
-        follows = self._follows(found)
+        times = self._times(answered)
+        follows = self._follows(answered)
         if follows:
             says = (
                 f"this step is right on top of your {' and '.join(follows)}; what is not right "
                 f"yet is there: look there first."
             )
             return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
-        if self._numbers(found):
+        if self._numbers(answered):
             return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
         posed = self.posed
         answers = posed.key, self.answer
         wrong = Wrong(
-            self.question, answers, posed.arguments, found, posed.expected, posed.known, posed.agree
+            self.question,
+            answers,
+            posed.arguments,
+            answered,
+            posed.expected,
+            posed.known,
+            posed.agree,
         )
-        message, names, explained = wrong.told()
+        message, names, explained = wrong.description()
         more = [] if explained else [wrong.case(self.posed.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
@@ -351,26 +359,26 @@ class _Check:
             WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share
         )
 
-    def _times(self, found: list[Any]) -> int:
+    def _times(self, answered: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""
         before, times = self.past.given.get(self.question.name, (None, 0))
-        again = before is not None and self.posed.agree(found, before)
-        self.past.given[self.question.name] = found, times + 1 if again else 1
+        again = before is not None and self.posed.agree(answered, before)
+        self.past.given[self.question.name] = answered, times + 1 if again else 1
         return times if again else 0
 
-    def _follows(self, found: list[Any]) -> tuple[str, ...]:
+    def _follows(self, answered: list[Any]) -> tuple[str, ...]:
         """Earlier questions on whose wrong answers this one is right: all of them, or one."""
         key = self.question.key
         own_step = key.step if isinstance(key, ForVariant) else key
         if own_step is None:
             return ()
         earlier = {
-            one.function: one
-            for one in self.exercise.questions.values()
-            if one.name in self.past.wrong
+            question.function: question
+            for question in self.exercise.questions.values()
+            if question.name in self.past.wrong
         }
         own = [function for function in earlier if function in uses(own_step)]
-        for chosen in ([own] if len(own) > 1 else []) + [[one] for one in own]:
+        for chosen in ([own] if len(own) > 1 else []) + [[function] for function in own]:
             try:
                 answers = {function: self._in_form(earlier[function]) for function in chosen}
                 step = rebound(own_step, answers)
@@ -381,8 +389,8 @@ class _Check:
                             self.posed.arguments, self.posed.expected, strict=True
                         )
                     ]
-                    if self.posed.agree(found, theirs):
-                        return tuple(earlier[one].name for one in chosen)
+                    if self.posed.agree(answered, theirs):
+                        return tuple(earlier[function].name for function in chosen)
             except (Exception, OutOfTime):  # of the earlier answer
                 continue
         return ()
@@ -421,13 +429,15 @@ def standard(value: Any) -> Any:
 
 
 def _agree(
-    found: Sequence[Any],
+    answered: Sequence[Any],
     expected: Sequence[Any],
     values: Mapping[sp.Symbol, Any],
     tolerance: float,
     places: Places = (),
 ) -> bool:
-    return all(equal(a, b, tolerance, values, places) for a, b in zip(found, expected, strict=True))
+    return all(
+        equal(a, b, tolerance, values, places) for a, b in zip(answered, expected, strict=True)
+    )
 
 
 def _wrong(

@@ -53,9 +53,9 @@ def like(answer: Any, expected: Any) -> Any:
                 f"expected {len(expected)} results, `return a, b, ...`, got {describe(answer)}"
             )
         parts = []
-        for place, (one, wanted) in enumerate(zip(answer, expected, strict=True), 1):
+        for place, (part, wanted) in enumerate(zip(answer, expected, strict=True), 1):
             try:
-                parts.append(like(one, wanted))
+                parts.append(like(part, wanted))
             except Unusable as reason:
                 raise Unusable(f"result {place} of {len(expected)}: {reason}") from None
         return tuple(parts)

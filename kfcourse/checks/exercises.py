@@ -123,15 +123,15 @@ class Exercise:
         # which a notebook that is graded does not find
         from kfcourse.derivations.worked import right_derivation
 
-        found = right_derivation(self.model) or right_derivation(
+        derivation = right_derivation(self.model) or right_derivation(
             find_variant(COURSE).plain("the exercises")
         )
-        if found is None:
+        if derivation is None:
             raise ExerciseError(
                 f"no derivation of variant {COURSE} can be checked: the package is broken; please "
                 f"report it"
             )
-        return found
+        return derivation
 
     @cached_property
     def given(self) -> Structures:

@@ -20,7 +20,7 @@ DECIMALS = (1.3, 0.7, 2.1, 0.4, 1.7, 0.9, 2.6, 0.6)  # values of symbols that ha
 def shown(
     names: Sequence[str],
     arguments: Sequence[Any],
-    found: Any,
+    answered: Any,
     expected: Any,
     part: str = "",
     axes: Sequence[str] = (),
@@ -32,7 +32,7 @@ def shown(
     ----------
     names, arguments : sequences
         Of the call.
-    found, expected : formula, matrix or array
+    answered, expected : formula, matrix or array
         The result, or the part of it, that is wrong there.  Of the expected one only the place
         where they differ is used.
     part : str
@@ -43,24 +43,26 @@ def shown(
         Of the parameters.
     """
     if isinstance(expected, sp.Basic | sp.MatrixBase):
-        return _formula(arguments, found, part, values or {})
-    return _array(names, arguments, np.asarray(found), np.asarray(expected), part, axes)
+        return _formula(arguments, answered, part, values or {})
+    return _array(names, arguments, np.asarray(answered), np.asarray(expected), part, axes)
 
 
 def _formula(
-    arguments: Sequence[Any], found: Any, part: str, values: Mapping[sp.Symbol, Any]
+    arguments: Sequence[Any], answered: Any, part: str, values: Mapping[sp.Symbol, Any]
 ) -> str:
     known = {symbol(s.name): value for s, value in values.items()}
-    symbols = {s for one in (*arguments, found) for s in getattr(one, "free_symbols", ())}
+    symbols = {
+        s for expression in (*arguments, answered) for s in getattr(expression, "free_symbols", ())
+    }
     point = {
         s: sp.Float(known.get(symbol(s.name), DECIMALS[i % len(DECIMALS)]), 6)
         for i, s in enumerate(sorted(symbols, key=lambda s: (symbol(s.name) in known, str(s))))
     }
-    entries = list(found) if isinstance(found, sp.MatrixBase) else [found]
+    entries = list(answered) if isinstance(answered, sp.MatrixBase) else [answered]
     numbers = [sp.N(entry.xreplace(point), 8) for entry in entries]
     if not all(number.is_real for number in numbers):
         return ""
-    shape = found.shape if isinstance(found, sp.MatrixBase) else ()
+    shape = answered.shape if isinstance(answered, sp.MatrixBase) else ()
     result = np.array([float(number) for number in numbers]).reshape(shape)
     where = ", ".join(f"{s} = {float(value):.4g}" for s, value in point.items())
     return f"An example: at {where} {_yours(part, result)}."
@@ -69,18 +71,18 @@ def _formula(
 def _array(
     names: Sequence[str],
     arguments: Sequence[Any],
-    found: np.ndarray,
+    answered: np.ndarray,
     expected: np.ndarray,
     part: str,
     axes: Sequence[str],
 ) -> str:
     place: tuple[int, ...] = ()
-    if axes and found.ndim >= len(axes):
+    if axes and answered.ndim >= len(axes):
         scale = np.max(np.abs(expected[np.isfinite(expected)]), initial=0.0)
-        wrong = ~np.isclose(found, expected, rtol=1e-6, atol=1e-6 * scale, equal_nan=True)
-        first = np.argwhere(wrong)[0] if wrong.any() else np.zeros(found.ndim, int)
+        wrong = ~np.isclose(answered, expected, rtol=1e-6, atol=1e-6 * scale, equal_nan=True)
+        first = np.argwhere(wrong)[0] if wrong.any() else np.zeros(answered.ndim, int)
         place = tuple(int(i) for i in first[: len(axes)])
-        found = found[place]
+        answered = answered[place]
     sizes = expected.shape[: len(place)]
     inputs = []
     for name, value in zip(names, arguments, strict=False):
@@ -100,7 +102,7 @@ def _array(
     where = "".join(f", {axis} {i}" for axis, i in zip(axes, place, strict=False))
     return (
         f"An example{where}{' (counted from 0)' if where else ''}: for {', '.join(inputs)} "
-        f"{_yours(part, found)}."
+        f"{_yours(part, answered)}."
     )
 
 

@@ -37,14 +37,14 @@ Said = tuple[str, str]
 class Case:
     """One result of a wrong answer.
 
-    found, expected : for every tuple of hidden arguments
+    answered, expected : for every tuple of hidden arguments
     arguments, names : these, and what they are called
     part : its place among the results
     others : the other results expected, by name
     axes : what the leading axes of the results are
     """
 
-    found: Sequence[Any]
+    answered: Sequence[Any]
     expected: Sequence[Any]
     agree: Agree
     arguments: Sequence[tuple]
@@ -60,13 +60,14 @@ class Case:
 
     @property
     def pairs(self) -> list[tuple[Any, Any]]:
-        return list(zip(self.found, self.expected, strict=True))
+        return list(zip(self.answered, self.expected, strict=True))
 
     @property
     def flat(self) -> list[np.ndarray]:
         """All numbers of both sides."""
         return [
-            np.concatenate([np.ravel(one) for one in side]) for side in (self.found, self.expected)
+            np.concatenate([np.ravel(values) for values in side])
+            for side in (self.answered, self.expected)
         ]
 
     @property
@@ -200,12 +201,12 @@ def instead(
     case: Case, other: dict[int, Callable[[Sequence[Any]], Any]], answer: Callable | None = None
 ) -> list[Any]:
     """What the right answer, or another one, gives with other arguments in some places."""
-    found = []
+    values_ = []
     answer = answer or case.sensitivity.answers[0]
     for values, wanted in zip(copy.deepcopy(case.arguments), case.expected, strict=True):
         result = answer(*(other[i](values) if i in other else v for i, v in enumerate(values)))
-        found.append(like(result[case.part] if case.sensitivity.several else result, wanted))
-    return found
+        values_.append(like(result[case.part] if case.sensitivity.several else result, wanted))
+    return values_
 
 
 def alike(first: Any, second: Any) -> bool:
@@ -233,11 +234,11 @@ def compared(rows: Callable[[Case], Iterator[Row]]) -> Callable[[Case], Said | N
             try:
                 would = list(made())
                 shaped = all(
-                    np.shape(a) == np.shape(b) for a, b in zip(case.found, would, strict=True)
+                    np.shape(a) == np.shape(b) for a, b in zip(case.answered, would, strict=True)
                 )
                 if (
                     shaped
-                    and case.agree(case.found, would)
+                    and case.agree(case.answered, would)
                     and not case.agree(would, case.expected)
                 ):
                     return name, says
@@ -262,7 +263,7 @@ def vanishing(case: Case) -> Said | None:
         )
         if not zero or not all(np.any(b) for b in case.expected):
             return None
-    elif not case.agree(case.found, [0 * value for value in case.expected]):
+    elif not case.agree(case.answered, [0 * value for value in case.expected]):
         return None
     return (
         "vanishing",
@@ -341,7 +342,7 @@ def first_step(case: Case) -> Said | None:
         (slice(1, None), slice(None, -1), "late"),
         (slice(None, -1), slice(1, None), "early"),
     ):
-        if case.agree([a[mine] for a in case.found], [b[right] for b in case.expected]):
+        if case.agree([a[mine] for a in case.answered], [b[right] for b in case.expected]):
             return "shifted", f"The values are right, but each stands one step too {word}."
     return None
 
@@ -423,25 +424,27 @@ DIGITS_LOST = (
 
 def improper(case: Case) -> Said | None:
     """A covariance that is none."""
-    for found, expected in case.pairs:
+    for answered, expected in case.pairs:
         if isinstance(expected, sp.MatrixBase):
             if (
                 expected.rows == expected.cols > 1
                 and case.agree([expected], [expected.T])
-                and not case.agree([found], [found.T])
+                and not case.agree([answered], [answered.T])
             ):
                 return "not-symmetric", NOT_SYMMETRIC
         elif case.numeric and expected.ndim > 1 and expected.shape[-1] == expected.shape[-2]:
             if not same(expected, expected.swapaxes(-1, -2)):
                 return None
-            if not np.allclose(found, found.swapaxes(-1, -2)):
-                symmetric = np.isclose(found, found.swapaxes(-1, -2)).all(axis=(-2, -1))
+            if not np.allclose(answered, answered.swapaxes(-1, -2)):
+                symmetric = np.isclose(answered, answered.swapaxes(-1, -2)).all(axis=(-2, -1))
                 return (
                     ("digits-lost", DIGITS_LOST)
                     if symmetric.mean() > 0.5
                     else ("not-symmetric", NOT_SYMMETRIC)
                 )
-            own, right = (np.diagonal(matrix, axis1=-2, axis2=-1) for matrix in (found, expected))
+            own, right = (
+                np.diagonal(matrix, axis1=-2, axis2=-1) for matrix in (answered, expected)
+            )
             # zero is negative at times, by rounding
             if (own < -1e-9 * np.max(right)).any() and (right >= 0).all():
                 return (
@@ -460,7 +463,7 @@ def unused(case: Case) -> Said | None:
     if case.numeric:
         missing, form = case.sensitivity.unused(case.part), "`{}`"
         # it does not feel a small change
-        if all(np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair):
+        if all(np.array_equal(array, np.round(array)) for pair in case.pairs for array in pair):
             missing = [
                 name
                 for name in missing
@@ -508,7 +511,7 @@ def multiplied(case: Case, factor: float) -> Iterator[tuple[str, list[Any], list
             called = case.sensitivity.called(place, lambda value: scaled(value, factor))
             right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
             same_shapes = all(a.shape == b.shape for a, b in zip(mine, right, strict=True))
-            if called and same_shapes and all(np.isfinite(one).all() for one in mine):
+            if called and same_shapes and all(np.isfinite(array).all() for array in mine):
                 yield f"`{name}`", mine, right
         return
     sides = [formulas(case, which) for which in (0, 1)]
@@ -543,7 +546,7 @@ def limit(case: Case) -> Said | None:
 
 def power(case: Case) -> Said | None:
     """Another power of an argument than in the right answer."""
-    before = [case.found, case.expected] if case.numeric else [formulas(case, i) for i in (0, 1)]
+    before = [case.answered, case.expected] if case.numeric else [formulas(case, i) for i in (0, 1)]
     grown: dict[str, list[list[float]]] = {}
     for factor in (2, 4):  # powers, if both give the same
         for name, *after in multiplied(case, factor):
@@ -586,7 +589,7 @@ def narrow(case: Case) -> Said | None:
         ("factor", [a / b for a, b in pairs if b != 0]),
         ("term", [a - b for a, b in pairs]),
     ):
-        on = {name for one in apart for name in symbols_of(one)}
+        on = {name for difference in apart for name in symbols_of(difference)}
         if len(apart) == len(pairs) and on < everything and len(on) < 2:
             which = f"depends on {on.pop()} only" if on else "is a number"
             return f"{what}-of", f"It is right but for a {what} that {which}."
@@ -654,9 +657,9 @@ def general(case: Case) -> Said | None:
     """The first hint that has something to say."""
     for hint in HINTS:
         try:
-            said = hint(case)
+            says = hint(case)
         except Exception:  # nonsense of many kinds
             continue
-        if said:
-            return said
+        if says:
+            return says
     return None

@@ -13,8 +13,8 @@ def unposed(variant: Variant) -> Finding | None:
 
     Its right answer fails, or is not accepted.
     """
-    for letter, one in sets().items():
-        if not one.about_variant:
+    for letter, set_ in sets().items():
+        if not set_.about_variant:
             continue
         try:
             exercise = Exercise(letter, variant)

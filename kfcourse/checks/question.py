@@ -43,7 +43,7 @@ class Mistake:
     Attributes
     ----------
     name : str
-        Such as "noise-forgotten"; for tests and the instructor's table.
+        Such as "noise-forgotten"; for tests.
     says : str
         What the student reads: the kind of mistake, not the answer.
     wrong : callable or ForVariant

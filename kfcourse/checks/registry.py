@@ -51,18 +51,19 @@ class ExerciseSet:
         return self.folder.name.replace("_", "-")
 
 
-def register(one: ExerciseSet) -> None:
+def register(set_: ExerciseSet) -> None:
     """Add a set; ValueError if its letter is taken."""
-    if one.letter in _registered:
+    if set_.letter in _registered:
         raise ValueError(
-            f"two exercise sets {one.letter!r}: {_registered[one.letter].folder} and {one.folder}"
+            f"two exercise sets {set_.letter!r}: {_registered[set_.letter].folder} and "
+            f"{set_.folder}"
         )
-    _registered[one.letter] = one
+    _registered[set_.letter] = set_
 
 
 def folders() -> set[Path]:
     """Folders in which the sets that are registered now live."""
-    return {one.folder for one in _registered.values()}
+    return {set_.folder for set_ in _registered.values()}
 
 
 def sets() -> Mapping[str, ExerciseSet]:

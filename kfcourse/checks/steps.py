@@ -93,13 +93,13 @@ def telling_steps(model: Model) -> list[int]:
     state, meter = compile_model(model)
     x = model.prior.mean + np.sqrt(np.diagonal(model.prior.cov))
     v, w = (law.mean + 1.0 for law in (model.state_noise, model.meter_noise))
-    found: dict[tuple[str, ...], int] = {}
+    first: dict[tuple[str, ...], int] = {}
     with np.errstate(all="ignore"):
         for k in range(int(min(TRIED, model.known.steps))):
-            found.setdefault(
+            first.setdefault(
                 tuple(f"{value:.9g}" for value in (*state(x, v, k), *meter(x, w, k))), k
             )
-    return list(found.values())
+    return list(first.values())
 
 
 def places(model: Model) -> list[Mapping[sp.Symbol, sp.Expr]]:
@@ -110,14 +110,16 @@ def places(model: Model) -> list[Mapping[sp.Symbol, sp.Expr]]:
         [s for s in model.known.symbols if s.name not in model.known.inputs],
     )
     equations = sp.Matrix([*model.state_equation, *model.meter_equation]).subs(model.values)
-    borders = [one.lhs - one.rhs for one in equations.atoms(sp.core.relational.Relational)]
-    borders += [one.args[0] for one in equations.atoms(sp.Heaviside, sp.sign, sp.Abs)]
+    borders = [
+        relation.lhs - relation.rhs for relation in equations.atoms(sp.core.relational.Relational)
+    ]
+    borders += [call.args[0] for call in equations.atoms(sp.Heaviside, sp.sign, sp.Abs)]
     steps = set[int]()
     for border in borders:
         for clock, length in ((s, interval if s.name == "t" else sp.S.One) for s in clocks):
             if border.free_symbols == {clock}:
                 at = [sp.floor(root / length) for root in _roots(border, clock)]
-                steps |= {int(one) + d for one in at for d in (-1, 0, 1, 2) if one + d >= 0}
+                steps |= {int(k) + d for k in at for d in (-1, 0, 1, 2) if k + d >= 0}
     return [
         {s: sp.Integer(k) * (interval if s.name == "t" else 1) for s in clocks}
         for k in sorted(steps)

@@ -6,7 +6,7 @@ setting   what letters mean: the law of the state, noises, the structural functi
 values    a tree at random points; means by Gauss-Hermite quadrature
 compared  are two lines equal?
 slips     which single change of a line makes it equal to the one above?
-said      what is said of a slip, and which rule the right step uses
+wording   what is said of a slip, and which rule the right step uses
 chains    the text of a whole derivation: its headings, its chains of lines
 worked    right derivations of structural functions, for worked solutions
 verdicts  each line beside the one above it; after a slip the check goes on from the student's line

@@ -15,7 +15,7 @@ letters S, q        more letters that may be used
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -54,9 +54,7 @@ class Chain:
     links: list[Typed] = field(default_factory=list)
 
 
-def read_chains(
-    text: str, find: FindModel | None, setting: Setting | None = None
-) -> Iterator[Chain]:
+def read_chains(text: str, find: FindModel | None, setting: Setting | None = None) -> list[Chain]:
     """The chains of a text.
 
     Parameters
@@ -78,32 +76,28 @@ def read_chains(
         raise DerivationError(
             f"the derivation has {len(lines)} lines; at most {MOST_LINES} are checked: split it up"
         )
-    chain: Chain | None = None
+    chains, goes_on = list[Chain](), False
     for number, line in enumerate(lines, 1):
         line = line.partition("#")[0].rstrip()
         if not line.strip():
             continue
         if "=" not in line:
-            if chain is not None:
-                yield chain
-                chain = None
+            goes_on = False
             setting = _heading(line.strip(), number, setting, find)
             continue
         pieces = _pieces(line, number)
-        if pieces[0].text.strip():
-            if chain is not None:
-                yield chain
-            chain = Chain(setting)
-        elif chain is None:
+        if pieces[0].text:
+            chains.append(Chain(setting))
+            goes_on = True
+        elif not goes_on:
             raise DerivationError(
                 f"line {number}: {line.strip()[:60]!r} goes on, but nothing stands above it; "
                 f"begin with a name, as in F = ..."
             )
         else:
             pieces = pieces[1:]
-        chain.links += pieces
-    if chain is not None:
-        yield chain
+        chains[-1].links += pieces
+    return chains
 
 
 def _pieces(line: str, number: int) -> list[Typed]:
@@ -126,10 +120,10 @@ def _heading(line: str, number: int, setting: Setting, find: FindModel | None) -
         return (
             replace(setting, kind=line) if setting.model is None else of_model(setting.model, line)
         )
-    if found := re.fullmatch(r"x\s*~\s*N\s*\(\s*(\w+)\s*,\s*(\w+)\s*\)", line):
-        return setting.at(*(_name(one, number) for one in found.groups()))
+    if match := re.fullmatch(r"x\s*~\s*N\s*\(\s*(\w+)\s*,\s*(\w+)\s*\)", line):
+        return setting.at(*(_name(name, number) for name in match.groups()))
     if word in ("positive", "letters") and rest.strip():
-        names = frozenset(_name(one, number) for one in re.split(r"[\s,]+", rest.strip()))
+        names = frozenset(_name(name, number) for name in re.split(r"[\s,]+", rest.strip()))
         if word == "positive":
             return replace(setting, positive=setting.positive | names)
         return setting if setting.known is None else replace(setting, known=setting.known | names)

@@ -135,8 +135,8 @@ def of_model(model: Model, kind: str = "gaussian") -> Setting:
     ModelError
         Its noises are not standard normal, or its equations depend on the step.
     """
-    for one, which in ((model.state_noise, "state_noise"), (model.meter_noise, "meter_noise")):
-        if np.any(one.mean != 0) or np.any(one.cov != np.eye(len(one.mean))):
+    for law_, which in ((model.state_noise, "state_noise"), (model.meter_noise, "meter_noise")):
+        if np.any(law_.mean != 0) or np.any(law_.cov != np.eye(len(law_.mean))):
             raise ModelError(
                 f"derivations are checked for standard normal noises, and `{which}` is another "
                 f"law; scale it in the equation"
@@ -167,23 +167,24 @@ def with_functions(setting: Setting) -> Setting:
     own = (
         {s.name for s in (*model.x, *model.v, *model.w)} | set(model.parameters) | set(law.letters)
     )
-    found: dict[str, Node] = {}
+    meanings: dict[str, Node] = {}
     if setting.kind == "gaussian":
         for first, second, equations in (
             ("tau", "Theta", model.state_equation),
             ("h", "F", model.meter_equation),
         ):
-            found |= _moments(first, second, [tree_of(one) for one in equations], own)
-        for i, one in enumerate(model.meter_equation):
+            meanings |= _moments(first, second, [tree_of(equation) for equation in equations], own)
+        for i, equation in enumerate(model.meter_equation):
             for j, x in enumerate(model.x):
-                found[_entry("G", i, j, model.p, n)] = mean(tree_of(sp.diff(one, x)))
+                meanings[_entry("G", i, j, model.p, n)] = mean(tree_of(sp.diff(equation, x)))
     else:
-        found |= _linearised(model, law)
-    found |= {
-        name: tree_of(one) for name, one in zip(model.measured, model.meter_equation, strict=True)
+        meanings |= _linearised(model, law)
+    meanings |= {
+        name: tree_of(equation)
+        for name, equation in zip(model.measured, model.meter_equation, strict=True)
     }
     return replace(
-        setting, meanings={name: tree for name, tree in found.items() if name not in own}
+        setting, meanings={name: tree for name, tree in meanings.items() if name not in own}
     )
 
 
@@ -196,16 +197,20 @@ def _moments(first: str, second: str, equations: list[Node], taken: set[str]) ->
     follows what was derived."""
     size = len(equations)
     names = [first if size == 1 else f"{first}{i + 1}" for i in range(size)]
-    found = {name: mean(one) for name, one in zip(names, equations, strict=True)}
+    meanings = {name: mean(equation) for name, equation in zip(names, equations, strict=True)}
     for i in range(size):
         for j in range(i, size):
             deviations = [
-                difference(equations[k], found[names[k]] if names[k] in taken else letter(names[k]))
+                difference(
+                    equations[k], meanings[names[k]] if names[k] in taken else letter(names[k])
+                )
                 for k in (i, j)
             ]
             tree = mean(power(deviations[0], 2) if i == j else product(*deviations))
-            found[_entry(second, i, j, size, size)] = found[_entry(second, j, i, size, size)] = tree
-    return found
+            meanings[_entry(second, i, j, size, size)] = meanings[
+                _entry(second, j, i, size, size)
+            ] = tree
+    return meanings
 
 
 def _linearised(model: Model, law: Law) -> dict[str, Node]:
@@ -214,25 +219,25 @@ def _linearised(model: Model, law: Law) -> dict[str, Node]:
         s: sp.S.Zero for s in (*model.v, *model.w)
     }
     cov = sp.Matrix(len(law.states), len(law.states), lambda i, j: symbol(law.cov[i][j]))
-    found: dict[str, sp.Expr] = {}
+    meanings: dict[str, sp.Expr] = {}
     for first, second, equation, noise in (
         ("tau", "Theta", model.state_equation, model.v),
         ("h", "F", model.meter_equation, model.w),
     ):
         A, B = (
-            equation.jacobian(sp.Matrix(one)).subs(at_mean, simultaneous=True)
-            for one in (model.x, noise)
+            equation.jacobian(sp.Matrix(variables)).subs(at_mean, simultaneous=True)
+            for variables in (model.x, noise)
         )
         values, size = equation.subs(at_mean, simultaneous=True), equation.rows
         covariance = A * cov * A.T + B * B.T
-        found |= {first if size == 1 else f"{first}{i + 1}": values[i] for i in range(size)}
-        found |= {
+        meanings |= {first if size == 1 else f"{first}{i + 1}": values[i] for i in range(size)}
+        meanings |= {
             _entry(second, i, j, size, size): covariance[i, j]
             for i in range(size)
             for j in range(size)
         }
         if first == "h":
-            found |= {
+            meanings |= {
                 _entry("G", i, j, *A.shape): A[i, j] for i in range(A.rows) for j in range(A.cols)
             }
-    return {name: tree_of(formula) for name, formula in found.items()}
+    return {name: tree_of(formula) for name, formula in meanings.items()}

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import chain
-from math import gcd
+from math import gcd, prod
 from typing import Any
 
 import numpy as np
@@ -143,14 +143,14 @@ class _Search:
         self.letters = [name for name in self.pool if name not in self.setting.meanings]
         both = [self.line, self.above]
         self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
-        self.mine, self.theirs = (self.values.of(one, keep=True) for one in both)
+        self.mine, self.theirs = (self.values.of(tree, keep=True) for tree in both)
         logs = [np.log(np.abs(self.values.letter(name))) for name in self.letters]
         self.inverse = np.linalg.pinv(np.array([np.ones(self.values.points), *logs]).T)
         self.terms = [
-            (sign, one)
+            (sign, term)
             for _, node in walk(self.above)
             if node.kind == SUM
-            for sign, one in zip(node.data, node.parts, strict=True)
+            for sign, term in zip(node.data, node.parts, strict=True)
         ]
 
     def best(self) -> list[Slip]:
@@ -160,12 +160,12 @@ class _Search:
             for i, (cost, slip, tree) in enumerate(self.fitting())
         ]
         kept: list[tuple[float, Slip]] = []
-        for cost, _, _, slip, tree in sorted(fitting, key=lambda one: one[:3]):
+        for cost, _, _, slip, tree in sorted(fitting, key=lambda candidate: candidate[:3]):
             if kept and cost > kept[0][0] + 1e-9:
                 break
             place = self._place(slip)
             # around a term that is named already
-            if any(self._place(one)[: len(place)] == place for _, one in kept):
+            if any(self._place(other)[: len(place)] == place for _, other in kept):
                 continue
             if self._equal(tree, self.line if slip.above or _of_noise(slip) else self.above):
                 kept.append((cost, slip))
@@ -179,7 +179,7 @@ class _Search:
 
     def fitting(self) -> Iterator[tuple[float, Slip, Node]]:
         """Changes that give the right values: cost, slip, the changed tree."""
-        for name in [one for one in self.setting.law.noises if one in letters(self.above)]:
+        for name in [noise for noise in self.setting.law.noises if noise in letters(self.above)]:
             for kind, value in (("noise-forgotten", 0), ("noise-mean", 1)):
                 tree = replaced(self.above, {name: number(value)})
                 if self._same(self.values.of(tree), self.mine):
@@ -199,10 +199,10 @@ class _Search:
                     count += 1
                     if count > MOST_TRIED:
                         return
-                    one, its = (
+                    changed_, its = (
                         (changed(root, path, new), target) if wanted is None else (new, wanted)
                     )
-                    if self._same(self.values.of(one), its):
+                    if self._same(self.values.of(changed_), its):
                         tree = changed(root, path, new)
                         if not self._nothing(tree, path, around, slip.kind):
                             yield cost, slip, tree
@@ -213,8 +213,8 @@ class _Search:
 
         With a noise that was lost a mean may be zero, and rightly so.
         """
-        for i, one in enumerate(around):
-            if one.kind in (MEAN, CALL, POWER):
+        for i, outer_ in enumerate(around):
+            if outer_.kind in (MEAN, CALL, POWER):
                 outer = at(tree, path[:i])
                 left = self.values.of(outer.parts[0] if kind == "lost-factor" else outer)
                 return bool(np.all(np.abs(left) <= 1e-9))
@@ -226,10 +226,12 @@ class _Search:
         Outside of them the line is (a + b t)/(c + d t), t the value: four of such values have one
         cross-ratio with those of t.
         """
-        if any(one.kind not in (SUM, PRODUCT) for one in around):
+        if any(outer.kind not in (SUM, PRODUCT) for outer in around):
             return None
         p, q, r = PROBES
-        first, second, third = (self.values.of(changed(root, path, number(one))) for one in PROBES)
+        first, second, third = (
+            self.values.of(changed(root, path, number(probe))) for probe in PROBES
+        )
         with np.errstate(all="ignore"):
             ratio = (target - first) * (second - third) / (target - third) / (second - first)
             ratio = ratio * float((q - p) / (q - r))
@@ -271,8 +273,8 @@ class _Search:
                 yield slip("sign", Node(SUM, parts, signs), below=(i,))
                 value = data[i] * self.values.of(part)
                 twice = any(
-                    j != i and self._same(data[j] * self.values.of(one), value)
-                    for j, one in enumerate(parts)
+                    j != i and self._same(data[j] * self.values.of(other), value)
+                    for j, other in enumerate(parts)
                 )
                 gone = Node(SUM, (*parts[:i], number(0), *parts[i + 1 :]), data)
                 if len(parts) > 1:
@@ -298,10 +300,10 @@ class _Search:
                 for k in (1, 2):
                     yield slip("lost-factor", product(power(letter(name), k), node), name)
         if outer != SUM:
-            for _, one in self.terms:
-                for term in (one, mean(one)):
+            for _, term in self.terms:
+                for lost in (term, mean(term)):
                     for sign in (1, -1):
-                        yield slip("lost", total(node, term, signs=(1, sign)), lost=one)
+                        yield slip("lost", total(node, lost, signs=(1, sign)), lost=term)
             if wanted is not None:
                 for q, powers in self._monomial(wanted - self.values.of(node)):
                     factors = [power(letter(name), k) for name, k in powers.items()]
@@ -313,10 +315,10 @@ class _Search:
     def _monomial(self, values: Array) -> Iterator[tuple[Fraction, dict[str, int]]]:
         """q and powers of letters of which these may be the values."""
         with np.errstate(all="ignore"):
-            found = (self.inverse @ np.log(np.abs(values)))[1:]
-            if np.abs(found).max(initial=0) <= 12:
+            exponents = (self.inverse @ np.log(np.abs(values)))[1:]
+            if np.abs(exponents).max(initial=0) <= 12:
                 powers = {
-                    n: int(k) for n, k in zip(self.letters, np.round(found), strict=True) if k
+                    n: int(k) for n, k in zip(self.letters, np.round(exponents), strict=True) if k
                 }
                 for name, k in powers.items():
                     values = values / self.values.letter(name) ** float(k)
@@ -327,29 +329,39 @@ class _Search:
         """Wrong and right moments of the normal law, and their order; of functions, too."""
         law = self.setting.law
         at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
-        for _, call in [*walk(self.line), *walk(self.above)]:
-            if call.kind == CALL and call.data in ENTIRE and letters(call) & set(law.states):
-                square, there = mean(power(call, 2)), replaced(call, at_mean)
-                yield there, mean(call), 0
-                yield power(there, 2), square, 0
-                yield power(mean(call), 2), square, 0
+        for _, node in [*walk(self.line), *walk(self.above)]:
+            if node.kind == CALL and node.data in ENTIRE and letters(node) & set(law.states):
+                there = replaced(node, at_mean)
+                yield there, mean(node), 0
+                yield power(there, 2), mean(power(node, 2)), 0
+            factors = self._factors(node)
+            for i in range(1, len(factors)):
+                apart = (mean(product(*part)) for part in (factors[:i], factors[i:]))
+                yield product(*apart), mean(product(*factors)), 0
         for i, x in enumerate(law.states):
             m, d, moment = letter(law.means[i]), letter(law.cov[i][i]), mean(power(letter(x), 2))
             for k in range(2, 9):
-                raw, half = mean(power(letter(x), k)), Fraction(k, 2)
-                central = mean(power(difference(letter(x), m), k))
+                raw, central = (
+                    mean(power(base, k)) for base in (letter(x), difference(letter(x), m))
+                )
                 yield power(m, k), raw, k
                 if k % 2 == 0:
+                    square, own = (power(base, Fraction(k, 2)) for base in (moment, d))
                     yield central, raw, k
                     yield raw, central, k
-                if k in (4, 6, 8):
-                    yield power(moment, half), raw, k
-                    many = number({4: 3, 6: 15, 8: 105}[k])
-                    yield product(many, power(moment, half)), raw, k
-                    yield power(d, half), central, k
-                    yield power(d, half), raw, k
+                    yield product(number(prod(range(1, k, 2))), square), raw, k
+                    yield own, central, k
+                    yield own, raw, k
                 if k == 4:
                     yield raw, difference(raw, power(moment, 2)), k
+
+    def _factors(self, node: Node) -> list[Node]:
+        """Those that depend on the state, x^3 as three of them."""
+        if node.kind == PRODUCT:
+            return [factor for part in node.parts for factor in self._factors(part)]
+        if node.kind == POWER and node.data in range(2, 9):
+            return self._factors(node.parts[0]) * int(node.data)
+        return [node] * bool(letters(node) & set(self.setting.law.states))
 
     def _unlikely(self, slip: Slip) -> float:
         """An addition to the cost of changing a term that is nothing, or that stands in the line
@@ -361,7 +373,7 @@ class _Search:
         if path:
             value = value * at(self.line, path[:-1]).data[path[-1]]
         stays = path and any(
-            self._same(value, sign * self.values.of(one)) for sign, one in self.terms
+            self._same(value, sign * self.values.of(term)) for sign, term in self.terms
         )
         return 0.35 if stays or np.all(np.abs(value) <= 1e-10) else 0.0
 

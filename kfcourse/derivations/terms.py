@@ -99,7 +99,7 @@ def changed(node: Node, path: Path, new: Node) -> Node:
 
 
 def letters(node: Node) -> set[str]:
-    return {one.data for _, one in walk(node) if one.kind == LETTER}
+    return {inner.data for _, inner in walk(node) if inner.kind == LETTER}
 
 
 def replaced(node: Node, names: dict[str, Node]) -> Node:

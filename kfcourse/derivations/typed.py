@@ -54,14 +54,14 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
         With the problem, the text and a pointer to the column.
     """
     pieces, columns, end = [], [], 0
-    for found in _OTHERWISE.finditer(text):
-        new = _IN_PYTHON[found[0]]
-        pieces += [text[end : found.start()], new]
+    for match in _OTHERWISE.finditer(text):
+        new = _IN_PYTHON[match[0]]
+        pieces += [text[end : match.start()], new]
         columns += [
-            *range(end, found.start()),
-            *(min(found.start() + i, found.end() - 1) for i in range(len(new))),
+            *range(end, match.start()),
+            *(min(match.start() + i, match.end() - 1) for i in range(len(new))),
         ]
-        end = found.end()
+        end = match.end()
     python, columns = "".join([*pieces, text[end:]]), [*columns, *range(end, len(text) + 1)]
     try:
         formula, tree, offset = syntax(python)
@@ -102,7 +102,7 @@ class _Lines(Reader):
         tree = replace(
             tree,
             span=place,
-            parts=tuple(one if one.span else replace(one, span=place) for one in tree.parts),
+            parts=tuple(part if part.span else replace(part, span=place) for part in tree.parts),
         )
         self.depth -= 1
         return tree
@@ -162,12 +162,6 @@ class _Lines(Reader):
         while isinstance(inner, ast.BinOp) and isinstance(inner.op, operators):
             parts.append((1 if isinstance(inner.op, operators[0]) else -1, inner.right))
             inner = inner.left
-            if len(parts) > LONGEST:
-                raise self.fail(
-                    node,
-                    f"the line has more than {LONGEST} numbers, letters and signs; split the step "
-                    f"up",
-                )
         signs: list[int] = []
         trees: list[Node] = []
         minus = False
@@ -175,27 +169,29 @@ class _Lines(Reader):
             tree = self.read(part)
             # -a + b: the sign of a term, not a sum in a sum
             if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:
-                (own,), (one,) = tree.data, tree.parts
-                sign, tree = sign * own, one
+                sign, tree = sign * tree.data[0], tree.parts[0]
             # -a*b is -(a*b)
             elif kind == PRODUCT and not trees and tree.kind == SUM and len(tree.parts) == 1:
                 minus, tree = tree.data == (-1,), tree.parts[0]
             signs.append(sign)
             trees.append(tree)
-        found = Node(kind, tuple(trees), tuple(signs))
-        return Node(SUM, (found,), (-1,)) if minus else found
+        tree = Node(kind, tuple(trees), tuple(signs))
+        return Node(SUM, (tree,), (-1,)) if minus else tree
 
     def _power(self, node: ast.BinOp) -> Node:
-        exponent = _constant(self.read(node.right))
-        if exponent is None:
+        try:
+            exponent = Reader(self.formula, {}, self.offset).read(node.right)
+        except FormulaError:
+            exponent = sp.nan
+        if not exponent.is_Rational:
             raise self.fail(
                 node.right, "an exponent must be a plain number; write exp(...) for exponentials"
             )
-        if abs(exponent) > MAX_EXPONENT or exponent.denominator > MAX_EXPONENT:
+        if abs(exponent) > MAX_EXPONENT or exponent.q > MAX_EXPONENT:
             raise self.fail(
                 node.right, f"the exponent is larger than {MAX_EXPONENT}, or too fine a fraction"
             )
-        return power(self.read(node.left), exponent)
+        return power(self.read(node.left), Fraction(exponent.p, exponent.q))
 
     def _mean(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
         wanted = 2 if name == "Cov" else 1
@@ -206,34 +202,12 @@ class _Lines(Reader):
                 if wanted == 2
                 else f"{name} takes one expression: {name}[a]",
             )
-        first, second = (self.read(one) for one in (arguments[0], arguments[-1]))
+        first, second = (self.read(argument) for argument in (arguments[0], arguments[-1]))
         if name == "M":
             return Node(MEAN, (first,))
         if name == "D":
             return difference(mean(power(first, 2)), power(mean(first), 2))
         return difference(mean(product(first, second)), product(mean(first), mean(second)))
-
-
-def _constant(node: Node) -> Fraction | None:
-    """The value of an exponent made of numbers; None if it has letters."""
-    if node.kind == NUMBER:
-        return Fraction(node.data)
-    if node.kind not in (SUM, PRODUCT):
-        return None
-    parts = [_constant(part) for part in node.parts]
-    if None in parts or (
-        node.kind == PRODUCT
-        and any(e < 0 and not part for e, part in zip(node.data, parts, strict=True))
-    ):
-        return None
-    value = (
-        sum((s * p for s, p in zip(node.data, parts, strict=True)), Fraction(0))
-        if node.kind == SUM
-        else Fraction(1)
-    )
-    for e, part in zip(node.data, parts, strict=True) if node.kind == PRODUCT else ():
-        value *= part**e
-    return value
 
 
 def tree_of(formula: sp.Expr) -> Node:

@@ -84,7 +84,7 @@ def means(node: Node, setting: Setting) -> list[Node]:
         meaning = setting.meanings.get(node.data)
         return means(meaning, setting) if meaning else []
     return ([node] if node.kind == MEAN else []) + [
-        one for part in node.parts for one in means(part, setting)
+        inner for part in node.parts for inner in means(part, setting)
     ]
 
 
@@ -102,17 +102,17 @@ class Values:
 
     def __init__(self, setting: Setting, trees: list[Node], points: int = TRIED, seed: str = ""):
         self.setting, self.points = setting, points
-        found: dict[str, float] = {}
+        highest: dict[str, float] = {}
         for tree in trees:
-            for one in means(tree, setting):
-                for name, degree in degrees(one.parts[0], setting).items():
-                    found[name] = max(found.get(name, 0), degree)
+            for mean_ in means(tree, setting):
+                for name, degree in degrees(mean_.parts[0], setting).items():
+                    highest[name] = max(highest.get(name, 0), degree)
         self.axes = {name: i for i, name in enumerate(setting.law.random)}
         n = len(setting.law.states)
         # a component is made of several normal numbers
-        most = max((found.get(x, 0) for x in setting.law.states), default=0)
+        most = max((highest.get(x, 0) for x in setting.law.states), default=0)
         sizes = [
-            most if name in setting.law.states and n > 1 else found.get(name, 0)
+            most if name in setting.law.states and n > 1 else highest.get(name, 0)
             for name in setting.law.random
         ]
         self.nodes = [hermite(FUNCTION_NODES if np.isinf(s) else int(s) + 2) for s in sizes]
@@ -130,8 +130,8 @@ class Values:
         with np.errstate(all="ignore"):
             value, size = self._value(node, False, keep)
         first, second = (
-            np.broadcast_to(one.reshape(one.shape[0], -1)[:, 0], self.points)
-            for one in (value, size)
+            np.broadcast_to(array.reshape(array.shape[0], -1)[:, 0], self.points)
+            for array in (value, size)
         )
         return first, second
 
@@ -220,14 +220,14 @@ class Values:
         parts = [self._value(part, inside, keep) for part in node.parts]
         if node.kind == SUM:
             value = size = self._column(np.zeros(1))
-            for sign, (one, its_size) in zip(node.data, parts, strict=True):
-                value, size = value + sign * one, size + its_size
+            for sign, (part, its_size) in zip(node.data, parts, strict=True):
+                value, size = value + sign * part, size + its_size
             return value, size
         if node.kind == PRODUCT:
             value = size = self._column(np.ones(1))
-            for e, (one, its_size) in zip(node.data, parts, strict=True):
-                value = value * one if e > 0 else value / one
-                size = size * its_size if e > 0 else size * its_size / one**2
+            for e, (part, its_size) in zip(node.data, parts, strict=True):
+                value = value * part if e > 0 else value / part
+                size = size * its_size if e > 0 else size * its_size / part**2
             return value, size
         inner, its_size = parts[0]
         if node.kind == POWER:

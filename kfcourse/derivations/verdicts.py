@@ -11,11 +11,11 @@ from typing import Any
 
 from kfcourse.derivations.chains import Chain, FindModel, Typed, read_chains
 from kfcourse.derivations.compared import DIFFERENT, EQUAL, IF_POSITIVE, NO_VALUE, compare
-from kfcourse.derivations.said import UNEXPLAINED, rule, told
 from kfcourse.derivations.setting import Law, Setting, of_side
 from kfcourse.derivations.slips import find_slips, named
 from kfcourse.derivations.terms import LETTER, MEAN, Node, at, letter, walk
 from kfcourse.derivations.values import Uncomputed
+from kfcourse.derivations.wording import UNEXPLAINED, described, rule
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.formula import FormulaError
 
@@ -84,7 +84,7 @@ class Derived:
 
     @property
     def right(self) -> bool:
-        return all(one.status in (BEGINS, RIGHT) for one in self.verdicts)
+        return all(verdict.status in (BEGINS, RIGHT) for verdict in self.verdicts)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Report:
 
     @property
     def verdicts(self) -> list[Verdict]:
-        return [one for chain in self.chains for one in chain.verdicts]
+        return [verdict for chain in self.chains for verdict in chain.verdicts]
 
     @property
     def right(self) -> bool:
@@ -104,12 +104,12 @@ class Report:
     @property
     def undecided(self) -> bool:
         """Whether a line cannot be read, or not be compared."""
-        return any(one.status in (UNREADABLE, UNDECIDED) for one in self.verdicts)
+        return any(verdict.status in (UNREADABLE, UNDECIDED) for verdict in self.verdicts)
 
     @property
     def first(self) -> Verdict | None:
         """The first line that differs."""
-        return next((one for one in self.verdicts if one.status == DIFFERS), None)
+        return next((verdict for verdict in self.verdicts if verdict.status == DIFFERS), None)
 
     def __str__(self) -> str:
         return "\n\n".join("\n".join(map(str, chain.verdicts)) for chain in self.chains)
@@ -153,15 +153,15 @@ def check_text(text: str, find: FindModel | None, setting: Setting | None = None
 class _Chain:
     chain: Chain
     derived: dict[str, tuple[Law, Node]]  # by name, with the law whose letters it has
-    found: list[Verdict] = field(default_factory=list)
+    verdicts: list[Verdict] = field(default_factory=list)
 
     def checked(self) -> Derived:
         first, *rest = self.chain.links
         name = first.text if first.text.isidentifier() else ""
         self.setting = of_side(self.chain.setting, name)
-        for one, (law, tree) in self.derived.items():
-            if law == self.setting.law and one != name:
-                self.setting = self.setting.defining(one, tree)
+        for letter_, (law, tree) in self.derived.items():
+            if law == self.setting.law and letter_ != name:
+                self.setting = self.setting.defining(letter_, tree)
         meant = name in self.setting.meanings
         previous: Node | None = letter(name) if meant else None
         above = "" if meant or name else first.text
@@ -202,8 +202,8 @@ class _Chain:
             and not self._comes_back(name, previous)
         ):
             self.derived[name] = self.setting.law, previous
-        closed = previous is not None and not any(one.kind == MEAN for _, one in walk(previous))
-        return Derived(name, tuple(self.found), meant or not name, closed)
+        closed = previous is not None and not any(inner.kind == MEAN for _, inner in walk(previous))
+        return Derived(name, tuple(self.verdicts), meant or not name, closed)
 
     def _comes_back(self, name: str, tree: Node) -> bool:
         """Whether what stands for a name has the name in it again, as the letters mean here:
@@ -211,17 +211,17 @@ class _Chain:
         seen: set[str] = set()
         waiting = [tree]
         while waiting:
-            new = {one.data for _, one in walk(waiting.pop()) if one.kind == LETTER} - seen
+            new = {inner.data for _, inner in walk(waiting.pop()) if inner.kind == LETTER} - seen
             seen |= new
             waiting += [
-                self.setting.meanings[one]
-                for one in new
-                if one != name and one in self.setting.meanings
+                self.setting.meanings[letter_]
+                for letter_ in new
+                if letter_ != name and letter_ in self.setting.meanings
             ]
         return name in seen
 
     def _says(self, link: Typed, status: str, says: str = "", **more: Any) -> None:
-        self.found.append(Verdict(link.line, link.column, link.text, status, says, **more))
+        self.verdicts.append(Verdict(link.line, link.column, link.text, status, says, **more))
 
     def _line(
         self, link: Typed, node: Node, previous: Node | None, above: str, name: str, broken: int
@@ -262,18 +262,22 @@ class _Chain:
             self._says(link, DIFFERS, says, kinds=("positive",))
             return broken or link.line
         slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
-        said = [told(self.setting, slip, link.text, node, above, previous) for slip in slips]
-        words = " or ".join(words for words, _ in said)
+        descriptions = [
+            described(self.setting, slip, link.text, node, above, previous) for slip in slips
+        ]
+        words = " or ".join(words for words, _ in descriptions)
         places = [at(node, named(node, slip.path)).span for slip in slips if not slip.above]
         says = (
-            f"the line differs from {where}: {words}" if said else UNEXPLAINED.format(above=where)
+            f"the line differs from {where}: {words}"
+            if descriptions
+            else UNEXPLAINED.format(above=where)
         )
         self._says(
             link,
             DIFFERS,
             says,
             kinds=tuple(slip.kind for slip in slips),
-            terms=tuple(term for _, term in said),
+            terms=tuple(term for _, term in descriptions),
             spans=tuple(place for place in places if place),
             rule=rule(self.setting, slips[0] if slips else None, node, previous, name),
         )

@@ -46,7 +46,7 @@ def stages(
     elif name[0] == "G":
         inner = sp.diff(a, model.x[digits[-1]])
     else:
-        means = [plain(law.mean_of(one)) for one in (a, b)]
+        means = [plain(law.mean_of(part)) for part in (a, b)]
         for place, i in enumerate((digits[0], digits[-1])):
             letter = ("tau" if name[0] == "T" else "h") + (f"{i + 1}" if len(side) > 1 else "")
             if letter in known:
@@ -113,9 +113,11 @@ def worth_deriving(model: Model) -> str:
     telling, other = [], []
     for first, second, equations in sides:
         size = len(equations)
-        for i, one in enumerate(equations):
+        for i, equation in enumerate(equations):
             index = "" if size == 1 else f"{i + 1}"
-            curved = bool(sp.Matrix([one.diff(x) for x in model.x]).free_symbols & set(model.x))
+            curved = bool(
+                sp.Matrix([equation.diff(x) for x in model.x]).free_symbols & set(model.x)
+            )
             telling += (
                 [(f"{second}{2 * index}" if model.n == 1 else f"{first}{index}")] if curved else []
             )
@@ -129,10 +131,10 @@ def derive(model: Model, name: str) -> str:
     """The text of a right derivation of a structural function, with a remark on each step."""
     setting = of_side(of_model(model), name)
     law = setting.law
-    mean = sp.Matrix([symbol(one) for one in law.means])
-    cov = sp.Matrix([[symbol(one) for one in row] for row in law.cov])
+    mean = sp.Matrix([symbol(entry) for entry in law.means])
+    cov = sp.Matrix([[symbol(entry) for entry in row] for row in law.cov])
     formulas, _ = stages(model, name, mean, cov, setting.meanings)
-    lines = [typed(one) for one in formulas]
+    lines = [typed(formula) for formula in formulas]
     remarks = [
         "",
         "# multiplied out",
@@ -158,7 +160,7 @@ def _definition(setting: Setting, name: str) -> str:
     needed = (f"y{index}", f"h{index}")
     return (
         f"M[({needed[0]} - {needed[1]})^2]"
-        if all(one in setting.meanings for one in needed)
+        if all(name in setting.meanings for name in needed)
         else ""
     )
 

@@ -26,7 +26,8 @@ UNHEALTHY = 0.1
 BEATEN = 5.0
 LOST = 100.0  # times the most accurate filter's D_k: ten times its error
 HEAVY = 0.1  # part of D_k that a single trajectory makes where the filter diverges on a few
-# of the bound: the standard error of a gap at least, as rare trajectories carry what is smaller
+# of the bound: standard error at least of what is said of a single step, as rare trajectories carry
+# what is smaller
 RESOLUTION = 5e-4
 ALIKE = 1e-10  # of D_k: filters that differ by less coincide but for rounding
 
@@ -174,8 +175,9 @@ class Comparison:
         return Estimate.jackknife(self._variance(name))
 
     def difference(self, first: str, second: str) -> Estimate:
-        """D_k(first) - D_k(second), (steps,), from paired trajectories."""
-        return Estimate.jackknife(self._variance(first) - self._variance(second))
+        """D_k(first) - D_k(second), (steps,), from paired trajectories; no finer than `gap`."""
+        difference = Estimate.jackknife(self._variance(first) - self._variance(second))
+        return self._resolved(difference, self._variance(self.reference)[:, 0])
 
     def relative(self, name: str, reference: str | None = None) -> Estimate:
         """D_k(name) / D_k(reference or control), (steps,)."""
@@ -209,21 +211,18 @@ class Comparison:
         Without the exact AOF, how far above the control.  NaN at steps that are not `usable`.
 
         Rare trajectories carry a gap that has become small, a sample may lack them, and then its
-        scatter does not show them.  So no gap is stated better than to `RESOLUTION`: a 95 %
-        interval has a thousandth of the bound to each side.  Of variant 53 these intervals hold the
-        true gap in 99 % of the cases over all 51 steps, and in 90 % at the worst step; those of
-        `mean_gap` in 97 %, of `difference` in 94 % (20,000 trajectories, 24 seeds,
+        scatter does not show them.  So nothing is said of a single step more finely than to
+        `RESOLUTION`: a 95 % interval has a thousandth of the bound to each side.  Of variant 53
+        these intervals hold true gaps and differences in 99 % of the cases, and in 93 % at the
+        worst step; those of `mean_gap` hold 97 % (20,000 trajectories, 37 seeds,
         `benchmarks/intervals.py`).
         """
-        gap = Estimate.jackknife(self._gap(name))
-        if not self.has_bound:
-            return gap
-        return replace(gap, standard_error=np.maximum(gap.standard_error, RESOLUTION))
+        return self._resolved(Estimate.jackknife(self._gap(name)), 1.0)
 
     def gap_difference(self, first: str, second: str) -> Estimate:
         """gap(first) - gap(second) per step, (steps,), paired: it tells which of two filters is the
-        more accurate."""
-        return Estimate.jackknife(self._gap(first) - self._gap(second))
+        more accurate; no finer than `gap`."""
+        return self._resolved(Estimate.jackknife(self._gap(first) - self._gap(second)), 1.0)
 
     def mean_gap(self, name: str, steps: slice = slice(None)) -> Estimate:
         """The mean over steps of `gap`: one number for a filter.
@@ -368,6 +367,14 @@ class Comparison:
             return self._means("square", name).sum(axis=1)
         bound = self._means("own", EXACT)
         return bound if name == EXACT else bound + self._means("distance", name)
+
+    def _resolved(self, estimate: Estimate, unit: Array | float) -> Estimate:
+        """An estimate of single steps, where there is a bound with a standard error of `RESOLUTION`
+        units at least."""
+        if not self.has_bound:
+            return estimate
+        least = RESOLUTION * unit
+        return replace(estimate, standard_error=np.maximum(estimate.standard_error, least))
 
     def _gap(self, name: str) -> Array:
         reference = np.where(self.usable[:, None], self._variance(self.reference), 0.0)

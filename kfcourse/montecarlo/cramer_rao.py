@@ -74,11 +74,11 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
     try:
         np.linalg.cholesky(model.prior.cov)
     except np.linalg.LinAlgError:
-        said = (
+        message = (
             "the prior leaves a component, or a sum of some, without variance: there is no "
             "density, and no bound of this kind"
         )
-        raise ModelError(said) from None
+        raise ModelError(message) from None
     object_ = _information(
         model, model.difference_equation("this bound"), model.v, model.state_noise, "state"
     )
@@ -86,8 +86,8 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
     J = np.linalg.inv(model.prior.cov)
     bounds = []
     for k, x in enumerate(simulate(model, runs, steps, seed).x):
-        told, *_ = meter(x, k)
-        J = J + _mean(told, "meter", k)
+        information, *_ = meter(x, k)
+        J = J + _mean(information, "meter", k)
         bounds.append(np.linalg.inv(J))
         of_state, mixed, of_next = object_(x, k)
         D12 = -means_without_each(mixed)
@@ -103,9 +103,11 @@ def _information(
     """(x (runs, n), k) -> I (runs, n, n), m_x^T S^-1 (runs, n, r), S^-1 (runs, r, r) of what the
     equation makes of x."""
     steps = [
-        one for one in equation.atoms(sp.sign, sp.Heaviside, sp.floor) if one.has(*model.x, *noise)
+        jump
+        for jump in equation.atoms(sp.sign, sp.Heaviside, sp.floor)
+        if jump.has(*model.x, *noise)
     ]
-    if steps or any(jumps(one, [*model.x, *noise]) for one in equation.atoms(sp.Piecewise)):
+    if steps or any(jumps(jump, [*model.x, *noise]) for jump in equation.atoms(sp.Piecewise)):
         raise ValueError(
             _infinite(what, "it jumps, and a jump has no slope: slopes elsewhere do not tell of it")
         )
@@ -135,7 +137,7 @@ def _information(
 
     def at(x: Array, k: int) -> tuple[Array, Array, Array]:
         slope, S, *changes = (
-            np.broadcast_to(one, (len(x), *one.shape[-2:])) for one in functions.at(k)(x)
+            np.broadcast_to(values, (len(x), *values.shape[-2:])) for values in functions.at(k)(x)
         )
         precision = np.linalg.inv(S)
         mixed = transpose(slope) @ precision

@@ -49,39 +49,44 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
         If a regression meets infinite or NaN values, or a filter a negative variance: the model or
         the filter diverges.
     """
-    for one in designs:
-        expect(one, Design, "design")
+    for design_ in designs:
+        expect(design_, Design, "design")
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     states = list[State]()
     with ThreadPoolExecutor(jobs) as pool:
         for k, instant in enumerate(ensemble):
             if k == 0:
-                _check_sizes(designs, instant)
-                states = [one.init(len(instant.x)) for one in designs]
-            given = [(one, state, instant, k) for one, state in zip(designs, states, strict=True)]
-            results = list(pool.map(lambda some: _fitted(*some), given))
+                check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
+                states = [design_.init(len(instant.x)) for design_ in designs]
+            given = [
+                (design_, state, instant, k) for design_, state in zip(designs, states, strict=True)
+            ]
+            results = list(pool.map(lambda task: _fitted(*task), given))
             states = [state for state, _ in results]
             for table, (_, fits) in zip(coefficients, results, strict=True):
                 table.append(fits)
-    return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
+    return [
+        design_.with_coefficients(table)
+        for design_, table in zip(designs, coefficients, strict=True)
+    ]
 
 
-def _check_sizes(designs: Sequence[Design], instant: Instant) -> None:
-    n, p = instant.x.shape[1], instant.y.shape[1]
-    for one in designs:
-        if (one.model.n, one.model.p) != (n, p):
+def check_sizes(filters: Iterable[Filter | Design], n: int, p: int) -> None:
+    """ValueError if one was built for other numbers of states or measurements."""
+    for filter_ in filters:
+        model = filter_.model
+        if (model.n, model.p) != (n, p):
             raise ValueError(
-                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} "
-                f"measurements; "
-                f"the ensemble has {n} and {p}"
+                f"{filter_.name} was built for a model with {model.n} states and {model.p} "
+                f"measurements; this one has {n} and {p}"
             )
 
 
-def _fitted(one: Design, state: State, instant: Instant, k: int) -> tuple[State, list[Affine]]:
+def _fitted(design_: Design, state: State, instant: Instant, k: int) -> tuple[State, list[Affine]]:
     """One step of a design: the next state, angles between -pi and pi, and the coefficients of its
     regressions."""
     fits = list[Affine]()
-    equations = one.equations(state, instant.y)
+    equations = design_.equations(state, instant.y)
     # what diverges is reported, by name
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         try:
@@ -90,18 +95,18 @@ def _fitted(one: Design, state: State, instant: Instant, k: int) -> tuple[State,
                 moments = request.scatter(instant.x, instant.x_next, instant.mode)
                 if not moments.size:
                     raise NotFinite(
-                        f"step {k}: no trajectory of the design is in a mode that {one.name} "
+                        f"step {k}: no trajectory of the design is in a mode that {design_.name} "
                         f"fits; take more trajectories",
-                        one.name,
+                        design_.name,
                     )
                 if not np.isfinite(moments.scatter).all():
-                    raise _diverged(one.name, instant, k)
+                    raise _diverged(design_.name, instant, k)
                 fits.append(moments.regression())
                 request = equations.send(fits[-1])
         except StopIteration as stop:
-            return with_angles_on_circle(stop.value, one.model.angles.x), fits
+            return with_angles_on_circle(stop.value, design_.model.angles.x), fits
         except (NegativeVariance, np.linalg.LinAlgError) as error:
-            raise failed(one.name, k, error) from None
+            raise failed(design_.name, k, error) from None
 
 
 def _diverged(name: str, instant: Instant, k: int) -> NotFinite:

@@ -227,7 +227,7 @@ def _noises(
     size) in 0 to 1."""
     if isinstance(model, JumpModel):
         noises = (model.modes[0].v, model.modes[0].w)
-        drawn = [rng.standard_normal((steps, len(one), size)).swapaxes(1, 2) for one in noises]
+        drawn = [rng.standard_normal((steps, len(noise), size)).swapaxes(1, 2) for noise in noises]
         return [*drawn, rng.random((steps, size))]
     return [_normal(rng, law, steps, size) for law in (model.state_noise, model.meter_noise)]
 

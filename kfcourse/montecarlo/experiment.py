@@ -28,7 +28,7 @@ from kfcourse.filters.looking_back import looked_back
 from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.designing import design, failed
+from kfcourse.montecarlo.designing import check_sizes, design, failed
 from kfcourse.montecarlo.ensemble import Instant, instants, weights
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.scores import scored
@@ -48,12 +48,12 @@ WIDE = 1.5  # times as wide as the prior: a law from which half of the initial s
 T = TypeVar("T")
 
 
-def run(one: Filter, y: Array) -> Gaussian:
+def run(filter_: Filter, y: Array) -> Gaussian:
     """Run a filter over stored measurements.
 
     Parameters
     ----------
-    one : Filter
+    filter_ : Filter
     y : ndarray (steps, runs, p)
         NaN where a measurement is missing.  One trajectory of a scalar meter may come as (steps,),
         and counts as runs = 1.
@@ -71,43 +71,45 @@ def run(one: Filter, y: Array) -> Gaussian:
         No filter: a `Design`, whose coefficients are still to be found, a model, or structural
         functions.
     """
-    return stacked([state.posterior for state in islice(walk(one, y), 1, None)])
+    return stacked([state.posterior for state in islice(walk(filter_, y), 1, None)])
 
 
-def predictions(one: Filter, y: Array) -> Gaussian:
+def predictions(filter_: Filter, y: Array) -> Gaussian:
     """What a filter expects before each measurement: lambda_k (steps, runs, n) and Psi_k (steps,
     runs, n, n).
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    return stacked([state.predicted for state in walk(one, y)][:-1])
+    return stacked([state.predicted for state in walk(filter_, y)][:-1])
 
 
-def states(one: Filter, y: Array) -> list[State]:
+def states(filter_: Filter, y: Array) -> list[State]:
     """The filter's states: before the first measurement, and after each.  Arguments and errors as
     of `run`."""
-    return list(walk(one, y))
+    return list(walk(filter_, y))
 
 
-def walk(one: Filter, y: Array) -> Iterator[State]:
+def walk(filter_: Filter, y: Array) -> Iterator[State]:
     """The same one after the other: what the exact filter or particles remember of all steps may be
     gigabytes."""
-    y = measurements(one, y)
-    return accumulate(y, one.step, initial=one.init(y.shape[1]))
+    y = measurements(filter_, y)
+    return accumulate(y, filter_.step, initial=filter_.init(y.shape[1]))
 
 
-def measurements(one: Filter, y: Array) -> Array:
+def measurements(filter_: Filter, y: Array) -> Array:
     """What a filter is to be run over, as (steps, runs, p); ValueError if it is none."""
-    expect(one, Filter, "a run")
-    y, p = np.asarray(y, dtype=float), one.model.p
+    expect(filter_, Filter, "a run")
+    y, p = np.asarray(y, dtype=float), filter_.model.p
     if y.ndim == 1 and p == 1:
         y = y[:, None, None]
     if y.ndim != 3:
         raise ValueError(
-            f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}"
+            f"measurements must have the shape (steps, runs, {p}), got {y.shape}; of two axes give "
+            f"y[:, None, :] if the columns are components of one trajectory, y[:, :, None] if they "
+            f"are trajectories"
         )
     if y.shape[2] != p:
-        raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
+        raise ValueError(f"{filter_.name} expects {p} measurement component(s), got {y.shape[2]}")
     if not y.size:
         raise ValueError(
             f"there are no measurements to run over: the shape (steps, runs, {p}) is {y.shape}"
@@ -117,19 +119,8 @@ def measurements(one: Filter, y: Array) -> Array:
         raise ValueError(
             f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing"
         )
-    warn_of_degrees("a measurement", y, one.model.measured, one.model.angles.y)
+    warn_of_degrees("a measurement", y, filter_.model.measured, filter_.model.angles.y)
     return y
-
-
-def _reshaped(y: Array, p: int) -> str:
-    """How measurements of two axes may be meant."""
-    if y.ndim != 2:
-        return ""
-    ways = (
-        ["y[:, None, :] if the columns are components of one trajectory"] if y.shape[1] == p else []
-    )
-    ways += ["y[:, :, None] if they are trajectories"] if p == 1 else []
-    return ": give " + " or ".join(ways) if ways else ""
 
 
 def compare(
@@ -191,8 +182,8 @@ def compare(
     """
     _check_arguments(filters, model)
     if smoothers:
-        for one in smoothers:
-            expect(one, Filter, "smoothers=")
+        for filter_ in smoothers:
+            expect(filter_, Filter, "smoothers=")
         _check_arguments(smoothers, model)
     jobs = cores() if jobs is None else jobs
     expect_sizes(runs=runs, steps=steps, jobs=jobs)
@@ -216,7 +207,8 @@ def compare(
             result = _compared(ready, sample, seed, jobs, progress, scores=scores)
         if not same_ensemble:
             result = replace(
-                result, designed=tuple(one.name for one in filters if isinstance(one, Design))
+                result,
+                designed=tuple(filter_.name for filter_ in filters if isinstance(filter_, Design)),
             )
         if smoothers:
             looking_back = _compared(smoothers, sample, seed, jobs, progress, back=True)
@@ -255,14 +247,14 @@ def without_failing(
     reasons = dict(left_out or {})
     while True:
         try:
-            found = compare(filters, *common, **options)
+            result = compare(filters, *common, **options)
         except NotFinite as error:
-            rest = [one for one in filters if one.name != error.filter_name]
-            if not error.filter_name or not [one for one in rest if not one.slow]:
+            rest = [filter_ for filter_ in filters if filter_.name != error.filter_name]
+            if not error.filter_name or not [filter_ for filter_ in rest if not filter_.slow]:
                 raise
             filters, reasons[error.filter_name] = rest, error.with_traceback(None)
         else:
-            return replace(found, left_out={**reasons, **found.left_out})
+            return replace(result, left_out={**reasons, **result.left_out})
 
 
 class Sample(NamedTuple):
@@ -278,10 +270,10 @@ class Sample(NamedTuple):
         """Some of the batches."""
         return self._replace(sizes=self.sizes[batches], seeds=self.seeds[batches])
 
-    def begun(self, one: Filter) -> State:
+    def begun(self, filter_: Filter) -> State:
         """A filter's state before the first measurement; what draws random numbers draws others for
         each sample."""
-        state = one.init(sum(self.sizes))
+        state = filter_.init(sum(self.sizes))
         if not hasattr(state.memory, "part"):
             return state
         return state._replace(memory=replace(state.memory, part=self.seeds[0].spawn_key))
@@ -299,11 +291,11 @@ def _designed(
     progress: bool | None,
 ) -> list[Filter]:
     """The filters in their order, those that need it designed on the ensemble."""
-    designs = [one for one in filters if isinstance(one, Design)]
+    designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
     if not designs:
-        return [one for one in filters if isinstance(one, Filter)]
+        return [filter_ for filter_ in filters if isinstance(filter_, Filter)]
     ready = iter(design(designs, _progress("designing", steps, "step", progress, ensemble), jobs))
-    return [next(ready) if isinstance(one, Design) else one for one in filters]
+    return [next(ready) if isinstance(filter_, Design) else filter_ for filter_ in filters]
 
 
 def _compared(
@@ -320,7 +312,7 @@ def _compared(
     running, left_out = list(filters), dict[str, Reason]()
     while True:
         # slow filters take much memory for each trajectory, and so does looking back
-        dear = back or any(one.slow for one in running)
+        dear = back or any(filter_.slow for filter_ in running)
         each = 1 if dear else max(1, PIECE // max(sample.sizes))
         parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
         work = (
@@ -331,11 +323,11 @@ def _compared(
             sums = Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
         except LeftOut as failure:
             left_out[failure.filter_name] = failure.reason
-            running = [one for one in running if one.name != failure.filter_name]
+            running = [filter_ for filter_ in running if filter_.name != failure.filter_name]
             if not running:
                 raise NotFinite(str(failure.reason), failure.filter_name) from None
         else:
-            names = tuple(one.name for one in running)
+            names = tuple(filter_.name for filter_ in running)
             runs = sum(sample.sizes)
             return Comparison(
                 sample.model,
@@ -369,7 +361,7 @@ def run_batches(
     end; `scores`: judge what they expect of measurements."""
     starts = np.concatenate([[0], np.cumsum(sample.sizes[:-1])]).astype(int)
     sums = Sums.empty(len(filters), sample.steps, sample.model.n, len(sample.sizes))
-    exact = next((i for i, one in enumerate(filters) if one.name == EXACT), None)
+    exact = next((i for i, filter_ in enumerate(filters) if filter_.name == EXACT), None)
     angles = sample.model.angles.x
     # what diverges is reported below, by name
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -383,12 +375,10 @@ def run_batches(
                     x = near(instant.x, state.posterior.mean, angles)
                     sums.record(i, k, x, state.posterior, weight, starts)
                     if scores is not None:
-                        for field, values in zip(
-                            (sums.log_score, sums.crps),
-                            scored(filters[i], scores, before[i], instant.y, state),
-                            strict=True,
-                        ):
-                            field[i, k] = np.add.reduceat(weight * values, starts)
+                        both = scored(filters[i], scores, before[i], instant.y, state)
+                        sums.log_score[i, k], sums.crps[i, k] = (
+                            np.add.reduceat(weight * values, starts) for values in both
+                        )
             if exact is None:
                 continue
             first, second, error = _twice(laws[exact])
@@ -406,12 +396,12 @@ Stage = tuple[Instant, list[State], list[State]]
 
 def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
     """The states of all filters before and after each measurement."""
-    states = [sample.begun(one) for one in filters]
+    states = [sample.begun(filter_) for filter_ in filters]
     for k, instant in enumerate(sample.instants()):
         before = [*states]
-        for i, one in enumerate(filters):
-            with _named(one, k):
-                states[i] = one.step(states[i], instant.y)
+        for i, filter_ in enumerate(filters):
+            with _named(filter_, k):
+                states[i] = filter_.step(states[i], instant.y)
         yield instant, before, states
 
 
@@ -420,10 +410,10 @@ def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
     record = list(sample.instants())
     y = np.stack([instant.y for instant in record])
     laws = []
-    for one in filters:
-        with _named(one, len(record) - 1):
-            states = accumulate(y, one.step, initial=sample.begun(one))
-            laws.append(looked_back(one, islice(states, 1, None), y))
+    for filter_ in filters:
+        with _named(filter_, len(record) - 1):
+            states = accumulate(y, filter_.step, initial=sample.begun(filter_))
+            laws.append(looked_back(filter_, islice(states, 1, None), y))
     for instant, after in zip(record, map(list, zip(*laws, strict=True)), strict=True):
         yield instant, [], after
 
@@ -440,15 +430,15 @@ def _twice(state: State) -> tuple[Array, Array, Array]:
 
 
 @contextmanager
-def _named(one: Filter, step: int) -> Iterator[None]:
+def _named(filter_: Filter, step: int) -> Iterator[None]:
     """What goes wrong in a filter is said with its name: it can be left out."""
     try:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
-        if one.slow or isinstance(error, Refused):
-            raise LeftOut(one.name, error.with_traceback(None)) from None
+        if filter_.slow or isinstance(error, Refused):
+            raise LeftOut(filter_.name, error.with_traceback(None)) from None
         if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
-            raise failed(one.name, step, error) from None
+            raise failed(filter_.name, step, error) from None
         raise
 
 
@@ -462,13 +452,15 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
             f"step {step}: every filter fails; the model's trajectories become infinite, check "
             f"its equations and parameters"
         )
-    one = filters[int(np.argmin(finite[:, step]))]
-    words = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
-    if one.slow:
-        raise LeftOut(one.name, NotFinite(words, one.name, "infinite", step=step))
-    raise NotFinite(
-        f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step
+    filter_ = filters[int(np.argmin(finite[:, step]))]
+    reason = NotFinite(
+        f"step {step}: {filter_.name} became infinite or NaN although the trajectories are finite: "
+        f"the filter diverges, or its model is another",
+        filter_.name,
+        "infinite",
+        step=step,
     )
+    raise LeftOut(filter_.name, reason) if filter_.slow else reason
 
 
 def _progress(
@@ -493,19 +485,13 @@ def _check_arguments(filters: Sequence[Filter | Design], model: Model | JumpMode
             f"compare expects a list of filters, and one came: compare([{filters.name}], model, "
             f"...)"
         )
-    for one in filters:
-        expect(one, Filter, "compare", Design)
+    for filter_ in filters:
+        expect(filter_, Filter, "compare", Design)
     expect(model, Model, "compare", JumpModel)
-    names = [one.name for one in filters]
+    names = [filter_.name for filter_ in filters]
     if len(set(names)) < len(names) or not names:
         raise ValueError(
             f"give at least one filter, and each a name of its own: "
             f"{', '.join(names) or 'none given'}"
         )
-    for one in filters:
-        if (one.model.n, one.model.p) != (model.n, model.p):
-            raise ValueError(
-                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} "
-                f"measurements; "
-                f"this one has {model.n} and {model.p}"
-            )
+    check_sizes(filters, model.n, model.p)

@@ -50,22 +50,22 @@ def recognised(
     """
     _, y, mode = simulate(model, runs, steps, seed)
     least = max(runs // SLOW, 2)
-    shown = int(np.argmax([len(np.unique(one)) for one in mode[:, :least].T]))
+    shown = int(np.argmax([len(np.unique(trajectory)) for trajectory in mode[:, :least].T]))
     share, there = {}, {}
-    for one in filters:
-        size = least if one.slow else runs
-        state, right = one.init(size), np.zeros(size)
+    for filter_ in filters:
+        size = least if filter_.slow else runs
+        state, right = filter_.init(size), np.zeros(size)
         probabilities = []
         for k in range(steps):
-            state = one.step(state, y[k, :size])
-            found = state.memory.probability
-            right += found.argmax(axis=1) == mode[k, :size]
-            probabilities.append(found[shown])
+            state = filter_.step(state, y[k, :size])
+            chances = state.memory.probability
+            right += chances.argmax(axis=1) == mode[k, :size]
+            probabilities.append(chances[shown])
         each = right / steps
-        share[one.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
-        there[one.name] = np.array(probabilities)
+        share[filter_.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
+        there[filter_.name] = np.array(probabilities)
     likeliest = [
         (np.bincount(mode[k]) if model.by_state else model.law_at(k)).argmax() for k in range(steps)
     ]
-    guess = np.mean([(mode[k] == one).mean() for k, one in enumerate(likeliest)])
+    guess = np.mean([(mode[k] == likely).mean() for k, likely in enumerate(likeliest)])
     return Recognised(share, float(guess), mode[:, shown], there)

@@ -65,8 +65,8 @@ def _say_left_out(variants_file: Path, others: bool) -> None:
     """Name the file's variants with modes, which nobody gets; ValueError if there are no others."""
     jumping = [
         name
-        for name, one in read_variants(variants_file)[0].items()
-        if isinstance(one.model, JumpModel)
+        for name, variant in read_variants(variants_file)[0].items()
+        if isinstance(variant.model, JumpModel)
     ]
     reason = (
         f"jump between modes, for which the exercises are not made: "

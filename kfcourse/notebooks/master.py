@@ -107,8 +107,8 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
 
 def _defined(source: str, question: Any) -> str:
     """Name of the function that an answer cell defines."""
-    found = re.search(r"^def (\w+)", source, re.MULTILINE)
-    return found.group(1) if found else getattr(question, "name", "")
+    match = re.search(r"^def (\w+)", source, re.MULTILINE)
+    return match.group(1) if match else getattr(question, "name", "")
 
 
 def _check_markers(source: str, where: str) -> None:

@@ -4,7 +4,7 @@ differ from variant to variant."""
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -104,7 +104,7 @@ class Solutions:
         model, known = self.exercise.model, (5,) if self.exercise.model.timed else ()
         cov = DEVIATIONS[:, None, None] ** 2 * np.eye(model.n)
         mean = np.tile(model.prior.mean, (len(cov), 1))
-        found = []
+        curves = []
         for place, (name, equation, functions, colour) in enumerate(
             (
                 (r"\Theta", "the state equation", "object_gaussian, object_linearised", "#0072B2"),
@@ -124,7 +124,7 @@ class Solutions:
                 (variances if variances.max() > SAME else most).argmax(), most.shape
             )
             index = "" if exact.shape[1:] == (1, 1) else f"_{{{row + 1}{column + 1}}}"
-            found.append(
+            curves.append(
                 Apart(
                     f"${name}{index}$",
                     equation,
@@ -135,7 +135,7 @@ class Solutions:
                     missing[:, row, column],
                 )
             )
-        return found
+        return curves
 
     def meter_is_silent(self) -> bool:
         """Whether the meter's noise, at the start and at the prior mean, leaves a combination of
@@ -157,11 +157,10 @@ class Solutions:
                 entries = ", ".join(f"{cov_name}[{i}, {j}]" for i, j in upper)
                 lines.append(f"{', '.join(str(part.cov[i, j]) for i, j in upper)} = {entries}")
         if len(formulas) == 1:
-            lines += returned(python(*formulas.values()))
+            values = [folded(python(*formulas.values()))]
         else:
-            values = (folded(f"{python(formula)},  # {name}") for name, formula in formulas.items())
-            lines += ["return (", *("    " + line for value in values for line in value), ")"]
-        return "\n".join(lines)
+            values = [folded(f"{python(formula)},  # {name}") for name, formula in formulas.items()]
+        return "\n".join([*lines, *returned([line for value in values for line in value])])
 
 
 def _continued(line: str) -> list[str]:
@@ -169,20 +168,21 @@ def _continued(line: str) -> list[str]:
     line joins them."""
     if line.startswith("#") or len(line) <= COLUMNS:
         return [line]
-    lines = textwrap.wrap(
-        line, COLUMNS - 4, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
-    )
+    lines = _wrapped(line, COLUMNS - 4)
     return [f"{part} \\" for part in lines[:-1]] + lines[-1:]
 
 
-def returned(code: str) -> list[str]:
-    """A return statement, in brackets where it takes several lines."""
-    lines = folded(code)
-    return (
-        [f"return {code}"]
-        if len(lines) == 1
-        else ["return (", *("    " + line for line in lines), ")"]
+def _wrapped(text: str, columns: int) -> list[str]:
+    return textwrap.wrap(
+        text, columns, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
     )
+
+
+def returned(lines: Sequence[str]) -> list[str]:
+    """A return statement, in brackets where it takes several lines."""
+    if len(lines) == 1:
+        return [f"return {lines[0]}"]
+    return ["return (", *("    " + line for line in lines), ")"]
 
 
 def folded(code: str) -> list[str]:
@@ -191,10 +191,7 @@ def folded(code: str) -> list[str]:
     if len(code) <= COLUMNS:
         return [code]
     code, *comment = code.split("  # ")
-    lines = textwrap.wrap(
-        code, COLUMNS, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
-    )
-    return ["# " + name for name in comment] + lines
+    return ["# " + name for name in comment] + _wrapped(code, COLUMNS)
 
 
 def python(formula: Any) -> str:

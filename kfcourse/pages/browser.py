@@ -44,16 +44,16 @@ _KEPT = (s.z, s.P, s.lam_next, s.Psi_next)  # what it leaves
 def statistics(letters: frozenset[sp.MatrixSymbol]) -> Mapping[sp.Symbol, str]:
     """How the means, covariances and inverted variances of letters, which the equations hold as
     symbols, are computed."""
-    found = {}
+    rules_ = {}
     for left, right in product(sorted(letters, key=str), repeat=2):
-        one, other = array_name(scalar(left)), array_name(scalar(right))
-        found[scalar(s.cov(left, right))] = f"kfCov(n, a.{one}, a.{other})"
+        first, other = array_name(scalar(left)), array_name(scalar(right))
+        rules_[scalar(s.cov(left, right))] = f"kfCov(n, a.{first}, a.{other})"
     for left in letters:
-        one = array_name(scalar(left))
-        found[scalar(s.mean(left))] = f"kfMean(n, a.{one})"
-        found[scalar(s.cov(left))] = f"kfCov(n, a.{one}, a.{one})"
-        found[scalar(s.cov_pinv(left))] = f"kfInverse(kfCov(n, a.{one}, a.{one}))"
-    return found
+        first = array_name(scalar(left))
+        rules_[scalar(s.mean(left))] = f"kfMean(n, a.{first})"
+        rules_[scalar(s.cov(left))] = f"kfCov(n, a.{first}, a.{first})"
+        rules_[scalar(s.cov_pinv(left))] = f"kfInverse(kfCov(n, a.{first}, a.{first}))"
+    return rules_
 
 
 def filter_source(name: str, structures: Structures) -> str:
@@ -62,19 +62,19 @@ def filter_source(name: str, structures: Structures) -> str:
     family, _, approximation = name.partition("-")
     structure = structures.gaussian if approximation == "gaussian" else structures.linearised
     rules = in_numbers(EQUATIONS[family], structures.model, structure, javascript.inverse)
-    letters = {*_GIVEN, *(one.lhs for one in EQUATIONS[family])}
+    letters = {*_GIVEN, *(equation.lhs for equation in EQUATIONS[family])}
     known = statistics(frozenset(letters))
     kept = [
-        scalar(one)
-        for one in _KEPT
-        if one in letters and any(scalar(one) == left for left, _ in rules)
+        scalar(letter)
+        for letter in _KEPT
+        if letter in letters and any(scalar(letter) == left for left, _ in rules)
     ]
     coefficients = {
         left: array_name(left) for left, right in rules if right.free_symbols & known.keys()
     }
     constants = list(structures.model.values)
     running = [(left, right) for left, right in rules if left not in coefficients]
-    given = [scalar(one) for one in (s.y, s.lam, s.Psi)]
+    given = [scalar(letter) for letter in (s.y, s.lam, s.Psi)]
     step = _loop("step", running, kept, given, constants, coefficients)
     if not coefficients:
         return f"{{ design: null, step: {step.strip()} }}"
@@ -92,7 +92,7 @@ def _design(
     coefficients: Mapping[sp.Symbol, str],
 ) -> str:
     """Loops and, between them, the coefficients: in the order of the equations."""
-    ready = [scalar(one) for one in _GIVEN]
+    ready = [scalar(letter) for letter in _GIVEN]
     lines, group = list[str](), list[Rule]()
     arrays = {array_name(symbol): symbol for symbol in ready}
     later = list(rules)
@@ -111,8 +111,8 @@ def _design(
             group.append((left, right))
             continue
         close()
-        names = {one: known[one] for one in right.free_symbols & known.keys()}
-        names |= {one: f"c.{key}" for one, key in coefficients.items()}
+        names = {letter: known[letter] for letter in right.free_symbols & known.keys()}
+        names |= {letter: f"c.{key}" for letter, key in coefficients.items()}
         lines.append(f"c.{coefficients[left]} = {javascript.expression(right, names)};")
     close()
     return "function (n, v, c, a) {\n" + "\n".join(lines) + "\n}"
@@ -128,7 +128,7 @@ def _used_later(
     those that are kept."""
     used = set(kept)
     for _, right in later:
-        texts = " ".join(known[one] for one in right.free_symbols & known.keys())
+        texts = " ".join(known[letter] for letter in right.free_symbols & known.keys())
         names = set(re.findall(r"a\.(\w+)", texts))
         used |= right.free_symbols | {left for left, _ in group if array_name(left) in names}
     return [left for left, _ in group if left in used]
@@ -146,8 +146,8 @@ def _loop(
     by_letter = dict(rules)
     return javascript.loop(
         name,
-        {array_name(one): sp.Matrix([one]) for one in given if one not in by_letter},
-        {array_name(one): sp.Matrix([one]) for one in wanted},
+        {array_name(letter): sp.Matrix([letter]) for letter in given if letter not in by_letter},
+        {array_name(letter): sp.Matrix([letter]) for letter in wanted},
         needed(rules, wanted),
         constants,
         coefficients,
@@ -211,7 +211,7 @@ def model_source(model: Model, names: Sequence[str] = LAB) -> str:
 
 def levels(model: Model) -> list[sp.Symbol]:
     """Parameters that only noises carry: sizes of noises, positive, for a logarithmic slider."""
-    silent = {one: 0 for one in (*model.v, *model.w)}
+    silent = {noise: 0 for noise in (*model.v, *model.w)}
     quiet = set().union(
         *(e.subs(silent).free_symbols for e in (*model.state_equation, *model.meter_equation))
     )

@@ -12,8 +12,8 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader
 
 from kfcourse.derivations import Report, check_text
-from kfcourse.derivations.said import DEFINITIONS, RULES
 from kfcourse.derivations.verdicts import MARKS, Verdict
+from kfcourse.derivations.wording import DEFINITIONS, RULES
 from kfcourse.lab.variants import Variant, find_variant
 
 SCRIPT = Path(__file__).parent / "data" / "derive.js"
@@ -39,8 +39,8 @@ def shown(report: Report) -> str:
 def _item(verdict: Verdict) -> str:
     words = "".join(f"<p>{_coded(part)}</p>" for part in (verdict.says, verdict.rule) if part)
     state = verdict.status.replace(" ", "-")
-    said = f"<span>{MARKS[verdict.status]} {verdict.status}</span>"
-    return f'<li class="kf-{state}"><code>{_marked(verdict)}</code> {said}{words}</li>\n'
+    status = f"<span>{MARKS[verdict.status]} {verdict.status}</span>"
+    return f'<li class="kf-{state}"><code>{_marked(verdict)}</code> {status}{words}</li>\n'
 
 
 def _marked(verdict: Verdict) -> str:
@@ -65,7 +65,7 @@ def _coded(text: str) -> str:
 def described(variants: Mapping[str, Variant]) -> str:
     """What the script needs of the variants and of the rules, as JSON: formulas and names, no
     result."""
-    plain = {name: one.plain("derivations") for name, one in variants.items()}
+    plain = {name: variant.plain("derivations") for name, variant in variants.items()}
     models = {
         name: {
             "title": variants[name].title,

@@ -101,7 +101,7 @@ def value(
 
 def columns(of: Mapping[str, sp.Expr]) -> dict[str, sp.Matrix]:
     """Each entry as a matrix of one, as `javascript.loop` takes them."""
-    return {key: sp.Matrix([one]) for key, one in of.items()}
+    return {key: sp.Matrix([formula]) for key, formula in of.items()}
 
 
 def rounded(rows: Iterable[Iterable[float]]) -> list[list[float]]:
@@ -124,8 +124,8 @@ def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
         DATA / "live-lab.js"
     ).read_text(encoding="utf-8")
     given: dict[str, Any] = {
-        "styles": {one: line_style(one) for one in LAB},
-        "titles": {one: title(one) for one in LAB},
+        "styles": {name: line_style(name) for name in LAB},
+        "titles": {name: title(name) for name in LAB},
         "variants": {key: f"{key}: {variant.title}" for key, variant in variants.items()},
         "first": "53",
         "step": 4,
@@ -224,7 +224,7 @@ def two_lines(
     }
     moments = {mean: "mean", variance: "variance"}
     loops = [
-        *(value(one, {"x": x}, e, moments) for one, e in curves.items()),
+        *(value(name, {"x": x}, e, moments) for name, e in curves.items()),
         javascript.loop("numbers", {}, columns(numbers), coefficients=moments),
     ]
     return drawn(name, "The tangent and the best line", "two-lines", loops, dict(first))
@@ -260,13 +260,13 @@ def gains(
         "lambda", "y" and "p" shown first.
     """
     letters, each = {prediction: "lambda", variance: "p"}, []
-    for one, estimate in estimates.items():
+    for short, estimate in estimates.items():
         gain = value(
             "gain", {"lambda": prediction}, sp.diff(estimate, measurement), {variance: "p"}
         )
         made = value("estimate", {"y": measurement}, estimate, letters)
-        each.append(f"{json.dumps(one)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
-    looks = {one: {"label": title(one), **line_style(one)} for one in estimates}
+        each.append(f"{json.dumps(short)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
+    looks = {name: {"label": title(name), **line_style(name)} for name in estimates}
     settings = {"first": dict(first), "variances": variances, "dots": rounded(dots), "looks": looks}
     return drawn(
         name,

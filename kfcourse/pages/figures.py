@@ -109,13 +109,13 @@ def label_ends(ax: Axes, least: float = 0.07, lowest: float = -np.inf, **text: A
             ends.append((line, *points[-1]))
     ax.autoscale_view()  # limits are final
     corner = ax.transAxes.inverted()
-    found = np.array(
+    points = np.array(
         [corner.transform(ax.transData.transform((x, y))) for _, x, y in ends]
     ).reshape(-1, 2)
     floor = (
         corner.transform(ax.transData.transform((0, lowest)))[1] if np.isfinite(lowest) else -np.inf
     )
-    heights = found[:, 1]
+    heights = points[:, 1]
     places = dict(zip(np.argsort(heights), _apart(np.sort(heights), least, floor), strict=True))
     for number, (line, _, _) in enumerate(ends):
         place = places[number]
@@ -129,7 +129,7 @@ def label_ends(ax: Axes, least: float = 0.07, lowest: float = -np.inf, **text: A
             }
             ax.add_line(
                 Line2D(
-                    [found[number, 0], 1.02], [heights[number], place], label="_leader", **leader
+                    [points[number, 0], 1.02], [heights[number], place], label="_leader", **leader
                 )
             )
         label = Legend(
@@ -158,8 +158,8 @@ def _apart(heights: np.ndarray, least: float, floor: float) -> np.ndarray:
     for value in free:
         pools.append((float(value), 1))
         while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
-            (one, n), (other, m) = pools[-2], pools[-1]
-            pools[-2:] = [((one * n + other * m) / (n + m), n + m)]
+            (mean, n), (other, m) = pools[-2], pools[-1]
+            pools[-2:] = [((mean * n + other * m) / (n + m), n + m)]
     return (
         np.maximum(np.concatenate([np.full(n, mean) for mean, n in pools]), floor) + steps
         if pools

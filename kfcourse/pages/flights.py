@@ -86,7 +86,7 @@ def by_part(
     """A table with a row for each part of the flight; columns of `rms_by_part` or `rms_difference`,
     value ± standard error."""
     rows: dict[str, list[Any]] = {heading: list(parts)}
-    for name, one in columns.items():
+    for name, estimate in columns.items():
         # no "-0.0"
-        rows[name] = list(zip(one.value.round(1) + 0.0, one.standard_error, strict=True))
+        rows[name] = list(zip(estimate.value.round(1) + 0.0, estimate.standard_error, strict=True))
     return table(rows, ".1f")

@@ -173,7 +173,7 @@ def slip(
         ),
         value("potential", {"Delta": error}, potential, letters),
     ]
-    settings = {"noises": [rounded(one) for one in draws], "first": dict(first), "range": levels}
+    settings = {"noises": [rounded(draw) for draw in draws], "first": dict(first), "range": levels}
     return drawn(name, "A ball on the potential", "slip", parts, settings)
 
 
@@ -211,7 +211,7 @@ def grid_step(
     )
 
 
-def leading(found: ParameterMap) -> dict[str, Any]:
+def leading(map_: ParameterMap) -> dict[str, Any]:
     """What `who_leads` shows of a map whose first parameter has one value: in per cent, with 95 %
     intervals.
 
@@ -223,14 +223,14 @@ def leading(found: ParameterMap) -> dict[str, Any]:
         step the most accurate filter and how many others are not significantly worse.
     """
     ratios, gaps, leaders = [], [], []
-    for (first, second), result in found.cells.items():
+    for (first, second), result in map_.cells.items():
         ratios.append(float(f"{second / first:.3g}"))
         steps = range(len(result.gap(LAB[0]).value))
         of = {name: (result.gap(name).value, *result.gap(name).interval()) for name in LAB}
         gaps.append(
             [
                 {
-                    name: [round(100 * float(one[k]), 4) for one in parts]
+                    name: [round(100 * float(part[k]), 4) for part in parts]
                     for name, parts in of.items()
                 }
                 for k in steps
@@ -238,30 +238,30 @@ def leading(found: ParameterMap) -> dict[str, Any]:
         )
         order = [result.leaders(k) for k in steps]
         leaders.append([(best, len(others)) for best, *others in order])
-    exact = min(result.runs for result in found.cells.values())
+    exact = min(result.runs for result in map_.cells.values())
     return {"trajectories": exact, "ratios": ratios, "gaps": gaps, "leaders": leaders}
 
 
-def who_leads(name: str, found: Mapping[str, Any], first: tuple[int, float]) -> str:
+def who_leads(name: str, leaders: Mapping[str, Any], first: tuple[int, float]) -> str:
     """The order of filters over the step and a ratio of noises.
 
     Parameters
     ----------
     name : str
         Of the figure.
-    found : dict
+    leaders : dict
         As `leading` returns it.
     first : (int, float)
         Step and ratio shown first.
     """
-    looks = {one: {"label": title(one), **line_style(one)} for one in found["gaps"][0][0]}
+    looks = {name: {"label": title(name), **line_style(name)} for name in leaders["gaps"][0][0]}
     kinds = {look["colour"]: look["label"].lstrip("GL") for look in looks.values()}
     settings = {
-        **found,
+        **leaders,
         "looks": looks,
         "kinds": [
             {"label": label, "colour": colour, "width": 9} for colour, label in kinds.items()
         ],
-        "first": {"k": first[0], "ratio": found["ratios"].index(first[1])},
+        "first": {"k": first[0], "ratio": leaders["ratios"].index(first[1])},
     }
     return drawn(name, "Which filter is the most accurate", "who-leads", [], settings)

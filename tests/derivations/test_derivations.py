@@ -201,6 +201,21 @@ def test_the_mean_of_a_sine(line, says):
     assert says in verdict_of(f"variant 5\nS = M[sin(x)]\n = {line}").says
 
 
+@pytest.mark.parametrize(
+    ("first", "line"),
+    [
+        ("M[x^3]", "M[x^2]*M[x]"),
+        ("g^2*d + f^2*M[x^4]", "g^2*d + f^2*M[x]*M[x^3]"),
+        ("M[x*sin(x)]", "m*M[sin(x)]"),
+        ("M[sin(x)^2]", "M[sin(x)]^2"),
+    ],
+)
+def test_the_mean_of_a_product_is_not_the_product_of_means(first, line):
+    assert (
+        "a product is not that of means" in verdict_of(f"variant 53\nS = {first}\n = {line}").says
+    )
+
+
 def test_a_noise_forgotten_and_a_noise_of_mean_one():
     start = f"{HEAD}F = M[(g*x + f*x^2*w - g*m)^2]\n = "
     assert verdict_of(start + "g^2*M[(x-m)^2]").kinds == ("noise-forgotten",)

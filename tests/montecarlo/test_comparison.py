@@ -339,14 +339,20 @@ def bounded(variant53):
     return by_hand(variant53, squares, own, distance)
 
 
-def test_no_gap_is_stated_better_than_to_a_thousandth_of_the_bound(bounded):
+def test_nothing_of_a_step_is_stated_better_than_to_a_thousandth_of_the_bound(bounded):
     """Distances that are small and alike in all batches: the trajectories that carry the gap may be
     missing in all."""
-    sums = bounded.sums._replace(distance=1e-6 * bounded.sums.distance)
-    gap = replace(bounded, sums=sums).gap("other")
-    assert gap.value.item() == pytest.approx(1e-6 * 1.5 / 4, rel=1e-12)
-    # of 3 degrees of freedom, Student's quantile is 3.18
-    assert gap.half_width().item() == pytest.approx(3.18 * 5e-4, rel=1e-2)
+    small = replace(bounded, sums=bounded.sums._replace(distance=1e-6 * bounded.sums.distance))
+    assert small.gap("other").value.item() == pytest.approx(1e-6 * 1.5 / 4, rel=1e-12)
+    pair, bound = ("other", "aof-gaussian"), 4
+    for estimate, unit in (
+        (small.gap("other"), 1),
+        (small.gap_difference(*pair), 1),
+        (small.difference(*pair), bound),
+    ):
+        # of 3 degrees of freedom, Student's quantile is 3.18
+        assert estimate.half_width().item() == pytest.approx(3.18 * 5e-4 * unit, rel=1e-2)
+    assert small.leaders(0) == ["aof-gaussian", "other"], "a millionth of the bound is no lead"
     assert bounded.gap("other").standard_error.item() > 5e-4, "as scattered as the sample says"
 
 

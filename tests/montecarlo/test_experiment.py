@@ -301,20 +301,12 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
     missing = np.where(np.arange(5) == 2, np.nan, y[:, 0, 0])
     np.testing.assert_array_equal(run(one, missing).mean, run(one, missing[:, None, None]).mean)
 
-    both, pair = r"y\[:, None, :\] .* or y\[:, :, None\]", aof(gaussian(vector))
+    pair = aof(gaussian(vector))
     for filter_, measurements, message in (
-        (one, np.zeros((5, 1)), both),
-        (one, np.zeros((5, 4)), r"\(5, 4\): give y\[:, :, None\] if they are trajectories$"),
-        (
-            pair,
-            np.zeros((5, 2)),
-            r"give y\[:, None, :\] if the columns are components of one trajectory$",
-        ),
-        (pair, np.zeros(5), r"must have the shape \(steps, runs, 2\), got \(5,\)$"),
-        (pair, np.zeros((5, 3)), r"got \(5, 3\)$"),
+        (one, np.zeros((5, 4)), r"\(5, 4\); of two axes give y\[:, None, :\] .* y\[:, :, None\]"),
+        (pair, np.zeros(5), r"must have the shape \(steps, runs, 2\), got \(5,\)"),
         (one, np.zeros((5, 1, 2)), "expects 1 measurement component"),
-        (one, 1.0, r"got \(\)$"),
-        (one, np.zeros((5, 3, 1, 1)), r"got \(5, 3, 1, 1\)$"),
+        (one, np.zeros((5, 3, 1, 1)), r"got \(5, 3, 1, 1\)"),
         (one, [], r"no measurements to run over.* is \(0, 1, 1\)$"),
         (one, np.zeros((5, 0, 1)), r"no measurements to run over"),
         (one, [0.1, -np.inf], "step 1, run 0 is infinite; write NaN where one is missing"),

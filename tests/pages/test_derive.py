@@ -30,6 +30,7 @@ BY_HAND = [
     "variant 53\nF = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2",
     "variant 5\nS = M[sin(x)^2]\n = sin(m)^2*exp(-d)\nG = -g*cos(m)*exp(d/2)\nG = g*cos(m)\nG = "
     "g*cos(m)*exp(d/2)",
+    "variant 53\nS = g^2*d + f^2*M[x^4]\n = g^2*d + f^2*M[x]*M[x^3]\nS = M[x*sin(x)]\n = m*M[sin(x)]",
     "variant 21\nlinearised\nF11 = cos(m1)^2*d11 + r^2\n = (1 - sin(m1)^2)*d11 + r",
 ]
 

@@ -168,12 +168,14 @@ def grade_all(
     """
     lines = table.with_suffix(".jsonl")
     known = {} if again else read_lines(lines)
-    grades = [replace(known[one.digest], name=one.name) for one in work if one.digest in known]
-    old, new = len(grades), [one for one in work if one.digest not in known]
+    grades = [
+        replace(known[work_.digest], name=work_.name) for work_ in work if work_.digest in known
+    ]
+    old, new = len(grades), [work_ for work_ in work if work_.digest not in known]
     write_lines(grades, lines)
     waiting = {
-        one.name: Grade(one.name, FAILED, notes=("the run ended before it was graded",))
-        for one in new
+        work_.name: Grade(work_.name, FAILED, notes=("the run ended before it was graded",))
+        for work_ in new
     }
     try:
         with lines.open("a", encoding="utf-8") as file:
@@ -207,9 +209,7 @@ def _show(grades: Sequence[Grade]) -> None:
 def _signs() -> dict[str, str]:
     """Signs of the marks that this screen can show."""
     try:
-        "".join(SIGNS.values()).encode(getattr(sys.stdout, "encoding", None) or "ascii")
-    except (UnicodeEncodeError, LookupError):
-        return {
-            mark: {"✓": "+", "✗": "x", "–": "-"}.get(sign, sign) for mark, sign in SIGNS.items()
-        }
+        "".join(SIGNS.values()).encode(sys.stdout.encoding or "ascii")
+    except UnicodeEncodeError:
+        return dict(zip(SIGNS, "+xx--?", strict=True))
     return SIGNS

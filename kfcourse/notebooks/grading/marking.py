@@ -35,6 +35,7 @@ from kfcourse.notebooks.grading.results import (
     PARTLY,
     Comment,
     Grade,
+    in_words,
 )
 from kfcourse.notebooks.grading.running import (
     KILLED,
@@ -243,7 +244,8 @@ class Marking:
         if result.status == UNUSABLE:
             self._reasons.setdefault(result.message, []).append(name)
         elif result.status == WRONG and result.diagnosis:
-            self._reasons.setdefault(", ".join(result.diagnosis), []).append(name)
+            words = (in_words(question, mistake) for mistake in result.diagnosis)
+            self._reasons.setdefault(", ".join(words), []).append(name)
 
     def _not_run(self, name: str, reason: str) -> None:
         """Say in the student's feedback where the notebook stopped."""

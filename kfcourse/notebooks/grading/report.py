@@ -12,13 +12,19 @@ from typing import Any
 import jinja2
 import markupsafe
 
-from kfcourse.checks import Question, sets
-from kfcourse.checks.hints import OF_RESULT
+from kfcourse.checks import sets
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading.owners import Person, known_sets, people, same_code
-from kfcourse.notebooks.grading.results import NOT_GRADED, NOT_RUN, SIGNS, Comment, Grade
+from kfcourse.notebooks.grading.results import (
+    NOT_GRADED,
+    NOT_RUN,
+    SIGNS,
+    Comment,
+    Grade,
+    in_words,
+)
 from kfcourse.notebooks.grading.weights import (
     USUAL,
     WEIGHTS,
@@ -132,7 +138,7 @@ def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dic
             grade.comments[name] for grade in _grades_of(persons, name) if name in grade.comments
         ]
         mistakes = Counter(
-            _in_words(question, mistake) for comment in comments for mistake in comment.mistakes
+            in_words(question, mistake) for comment in comments for mistake in comment.mistakes
         ).most_common()
         row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
         row |= {label: counts[mark] for mark, label in KINDS.items()}
@@ -150,16 +156,6 @@ def _grades_of(persons: Iterable[Person], question: str) -> Iterator[Grade]:
     return (
         grade for person in persons for grade in person.grades.values() if question in grade.marks
     )
-
-
-def _in_words(question: Question, name: str) -> str:
-    """What is said of a known mistake, or of what is known of any result; of others the name tells
-    it."""
-    known = {"follows": "right on top of an earlier wrong answer"} | {
-        code: says for code, says, _ in OF_RESULT
-    }
-    known |= {mistake.name: mistake.says.partition(". ")[0] for mistake in question.mistakes}
-    return known.get(name, name.replace("-", " ")).rstrip(".")
 
 
 def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> str:

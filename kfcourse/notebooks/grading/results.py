@@ -9,7 +9,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from kfcourse.checks import sets
+from kfcourse.checks import Question, sets
+from kfcourse.checks.hints import OF_RESULT
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.texts import write_csv
@@ -91,6 +92,15 @@ class Grade:
         return "; ".join([*self.notes, *(f"look: {look}" for look in self.looks)])
 
 
+def in_words(question: Question, name: str) -> str:
+    """What is said of a known mistake, or of what is known of any result; of others the name tells
+    it."""
+    says = {code: sentence for code, sentence, _ in OF_RESULT}
+    says |= {mistake.name: mistake.says for mistake in question.mistakes}
+    says["follows"] = "right on top of an earlier wrong answer"
+    return says.get(name, name.replace("-", " ")).partition(". ")[0].rstrip(".")
+
+
 def line(grade: Grade) -> str:
     """The grade as a line of JSON."""
     return json.dumps(asdict(grade)) + "\n"
@@ -124,7 +134,7 @@ def write_lines(grades: Iterable[Grade], path: Path) -> None:
 
 def write_table(grades: Iterable[Grade], path: Path) -> None:
     """Write a row for each grade as CSV that spreadsheets open, completely or not at all."""
-    questions = [f"q{i + 1}" for i in range(max(len(one.questions) for one in sets().values()))]
+    questions = [f"q{i + 1}" for i in range(max(len(set_.questions) for set_ in sets().values()))]
     columns = [
         "notebook",
         "status",
@@ -138,15 +148,9 @@ def write_table(grades: Iterable[Grade], path: Path) -> None:
     ]
     rows = []
     for grade in sorted(grades, key=lambda grade: grade.name):
-        passed, of = (str(grade.passed), str(len(grade.marks))) if grade.marks else ("", "")
-        rows.append(
-            {
-                "notebook": grade.name,
-                "status": grade.status,
-                "set": grade.letter,
-                "variant": grade.variant,
-            }
-            | dict(zip(questions, grade.marks.values(), strict=False))
-            | {"passed": passed, "of": of, "note": grade.note, "student": grade.student}
-        )
+        passed, of = (grade.passed, len(grade.marks)) if grade.marks else ("", "")
+        marks = [*grade.marks.values(), *[""] * (len(questions) - len(grade.marks))]
+        head = [grade.name, grade.status, grade.letter, grade.variant]
+        row = [*head, *marks, passed, of, grade.note, grade.student]
+        rows.append(dict(zip(columns, row, strict=True)))
     write_csv(columns, rows, path)

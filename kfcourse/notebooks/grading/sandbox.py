@@ -108,9 +108,9 @@ def end_with_all_below(pid: int) -> None:
     """Kill a process, and what it has started so far as it is still below it."""
     with suppress(psutil.Error):
         process = psutil.Process(pid)
-        for one in (*process.children(recursive=True), process):
+        for child in (*process.children(recursive=True), process):
             with suppress(psutil.Error):
-                one.kill()
+                child.kill()
 
 
 def problem(folder: Path, stage: Path) -> str:

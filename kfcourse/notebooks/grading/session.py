@@ -22,7 +22,7 @@ from traitlets.config import Config
 
 import kfcourse.exercises
 from kfcourse.checks import Exercise, Result, exercise
-from kfcourse.checks.engine import in_library, told
+from kfcourse.checks.engine import in_a_line, in_library
 from kfcourse.limits import OutOfTime, limit_process, time_limit
 from kfcourse.notebooks.grading.channel import Channel, Closed
 from kfcourse.notebooks.grading.values import decode, encode
@@ -116,7 +116,7 @@ class Session:
                 "fails": "calls itself without end, or nests a formula without end (RecursionError)"
             }
         except BaseException as error:
-            return {"fails": "missing" if _of_a_stub(error) else f"stops with {told(error)}"}
+            return {"fails": "missing" if _of_a_stub(error) else f"stops with {in_a_line(error)}"}
 
     def _proxy(self, number: int) -> Any:
         """A function of the grader's: called there, with these values."""

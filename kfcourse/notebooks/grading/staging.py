@@ -80,13 +80,13 @@ def stage(folder: Path) -> Path:
         shutil.copy2(own / "notebooks" / name, copied)
     registered = list(sets().values())
     (target / "exercises").mkdir()
-    for one in registered:
-        if (one.folder / COMPANIONS).exists():
-            (target / "exercises" / one.folder.name).mkdir()
-            shutil.copy2(one.folder / COMPANIONS, target / "exercises" / one.folder.name)
+    for set_ in registered:
+        if (set_.folder / COMPANIONS).exists():
+            (target / "exercises" / set_.folder.name).mkdir()
+            shutil.copy2(set_.folder / COMPANIONS, target / "exercises" / set_.folder.name)
     rows = [
-        (one.letter, one.title, one.folder.name, one.about_variant, one.angles)
-        for one in registered
+        (set_.letter, set_.title, set_.folder.name, set_.about_variant, set_.angles)
+        for set_ in registered
     ]
     (target / "exercises" / "__init__.py").write_text(
         REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8"
@@ -108,7 +108,7 @@ def _cache_of_matplotlib() -> Path:
 def answers() -> list[Path]:
     """Folders that hold the right answers: no notebook may read them."""
     return sorted(
-        {one.folder.parent for one in sets().values()}
+        {set_.folder.parent for set_ in sets().values()}
         | {Path(str(resources.files("kfcourse.exercises")))}
     )
 
@@ -123,8 +123,8 @@ def personal_numbers(own: Exercise, others: Iterable[Exercise] = ()) -> dict[str
     return numbers
 
 
-def _key(one: Exercise) -> str:
-    return f"{one.letter} {one.variant.name}"
+def _key(exercise: Exercise) -> str:
+    return f"{exercise.letter} {exercise.variant.name}"
 
 
 def opened_elsewhere(calls: Iterable[tuple[object, object]]) -> list[Exercise]:

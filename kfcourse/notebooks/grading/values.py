@@ -187,7 +187,8 @@ def _read(node: ast.AST) -> sp.Basic:
             func=ast.Name(id="Symbol"), args=[ast.Constant(value=str(name))], keywords=given
         ):
             return sp.Symbol(
-                name, **{str(one.arg): bool(ast.literal_eval(one.value)) for one in given}
+                name,
+                **{str(keyword.arg): bool(ast.literal_eval(keyword.value)) for keyword in given},
             )
         case ast.Call(func=ast.Name(id="Integer" | "Rational"), args=parts, keywords=[]):
             return sp.Rational(*(int(ast.literal_eval(part)) for part in parts))

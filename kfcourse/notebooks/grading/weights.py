@@ -75,5 +75,7 @@ def tidy(number: float) -> float:
 def possible(letters: Iterable[str], level: str | None = None) -> int:
     """Points that there are in some sets."""
     return sum(
-        WEIGHTS[one.level] for one in questions(letters).values() if level in (None, one.level)
+        WEIGHTS[question.level]
+        for question in questions(letters).values()
+        if level in (None, question.level)
     )

@@ -705,24 +705,36 @@
     moments() {
       const found = [], { states, means, cov } = this.setting, atMean = Object.fromEntries(states.map((x, i) => [x, letter(means[i])]));
       for (const [, call] of [...walk(this.line), ...walk(this.above)]) {
+        const factors = this.factors(call);
+        for (let i = 1; i < factors.length; i++) {
+          const apart = [factors.slice(0, i), factors.slice(i)].map((some) => mean(product(some)));
+          found.push([product(apart), mean(product(factors)), 0]);
+        }
         if (call.kind !== "call" || !ENTIRE.includes(call.data) || !states.some((x) => letters(call).has(x))) continue;
-        const square = mean(power(call, 2)), there = replaced(call, atMean);
-        found.push([there, mean(call), 0], [power(there, 2), square, 0], [power(mean(call), 2), square, 0]);
+        const there = replaced(call, atMean);
+        found.push([there, mean(call), 0], [power(there, 2), mean(power(call, 2)), 0]);
       }
       states.forEach((x, i) => {
         const m = letter(means[i]), d = letter(cov[i][i]), moment = mean(power(letter(x), 2));
         for (let k = 2; k < 9; k++) {
-          const raw = mean(power(letter(x), k)), central = mean(power(minus(letter(x), m), k)), factor = { 4: 3, 6: 15, 8: 105 }[k];
+          const [raw, central] = [letter(x), minus(letter(x), m)].map((one) => mean(power(one, k)));
           found.push([power(m, k), raw, k]);
-          if (k % 2 === 0) found.push([central, raw, k], [raw, central, k]);
-          if (factor) {
-            const square = power(moment, k / 2), own = power(d, k / 2);
-            found.push([square, raw, k], [product([number(factor), square]), raw, k], [own, central, k], [own, raw, k]);
+          if (k % 2 === 0) {
+            const [square, own] = [moment, d].map((one) => power(one, k / 2)), many = { 2: 1, 4: 3, 6: 15, 8: 105 }[k];
+            found.push([central, raw, k], [raw, central, k], [product([number(many), square]), raw, k], [own, central, k], [own, raw, k]);
           }
           if (k === 4) found.push([raw, minus(raw, power(moment, 2)), k]);
         }
       });
       return found;
+    }
+
+    factors(node) { // those that depend on the state, x^3 as three of them
+      if (node.kind === "product") return node.parts.flatMap((part) => this.factors(part));
+      if (node.kind === "power" && [2, 3, 4, 5, 6, 7, 8].includes(node.data)) {
+        return Array(node.data).fill(this.factors(node.parts[0])).flat();
+      }
+      return this.setting.states.some((x) => letters(node).has(x)) ? [node] : [];
     }
 
     unlikely(slip) { // changing a term that is nothing, or that stands in the line above as it is
@@ -765,7 +777,7 @@
 
   function told(setting, slip, text, line, textAbove, above) {
     const shown = (from, node) => (node.span ? from.slice(...node.span) : "");
-    const moment = slip.kind === "moment" && !slip.order ? ": the mean of a function, or of its square, is not that of the mean"
+    const moment = slip.kind === "moment" && !slip.order ? ": the mean of a function, a square or a product is not that of means"
       : slip.order ? `: it takes a moment of order ${slip.order} for another one` : "";
     if (slip.above) {
       const term = textAbove ? shown(textAbove, at(above, named(above, slip.path))) : "";

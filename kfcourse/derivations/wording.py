@@ -52,7 +52,7 @@ def shown(text: str, node: Node) -> str:
     return text[slice(*node.span)] if node.span else written(node)
 
 
-def told(
+def described(
     setting: Setting, slip: Slip, text: str, line: Node, text_above: str, above: Node
 ) -> tuple[str, str]:
     """What to say of a slip, and the term that is named.
@@ -88,7 +88,7 @@ def told(
 
 def _moment(slip: Slip) -> str:
     if slip.kind == "moment" and not slip.order:
-        return ": the mean of a function, or of its square, is not that of the mean"
+        return ": the mean of a function, a square or a product is not that of means"
     return f": it takes a moment of order {slip.order} for another one" if slip.order else ""
 
 
@@ -123,9 +123,11 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
     ):
         return RULES["noise"]
     states = set(setting.law.states)
-    means, left = ([one for one in _means(node) if letters(one) & states] for node in (above, line))
+    means, left = (
+        [mean_ for mean_ in _means(node) if letters(mean_) & states] for node in (above, line)
+    )
     if kind == "moment" or len(means) > len(left):
-        calls = any(one.kind == CALL for mean in means for _, one in walk(mean))
+        calls = any(inner.kind == CALL for mean in means for _, inner in walk(mean))
         return RULES["functions" if calls else "moments"]
     if kind in ("lost", "factor", "extra") and _squares(above) > _squares(line):
         return RULES["square"]
@@ -135,8 +137,8 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
 
 
 def _means(node: Node) -> list[Node]:
-    return [one for _, one in walk(node) if one.kind == MEAN]
+    return [inner for _, inner in walk(node) if inner.kind == MEAN]
 
 
 def _squares(node: Node) -> int:
-    return sum(one.kind == POWER and one.parts[0].kind == SUM for _, one in walk(node))
+    return sum(inner.kind == POWER and inner.parts[0].kind == SUM for _, inner in walk(node))
