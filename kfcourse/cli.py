@@ -33,6 +33,7 @@ from kfcourse.lab.report import (
     write_json,
     write_report,
 )
+from kfcourse.lab.report_sections import score_cells
 from kfcourse.lab.short_names import (
     FILTERS,
     JUMP_FILTERS,
@@ -242,9 +243,8 @@ def lab(
     for answer in answers:
         for warning in answer.warnings:
             click.echo(f"Warning: {title(answer.name)}: {warning}", err=True)
-        if entries[answer.name].functions in ("gaussian", "best", "averaged"):
-            for remark in answer.remarks:
-                remarks.setdefault(remark, []).append(title(answer.name))
+        for remark in answer.remarks:
+            remarks.setdefault(remark, []).append(title(answer.name))
     for remark, titles in remarks.items():
         click.echo(f"{', '.join(titles)}: {remark}", err=True)
     filters = [answer.built for answer in answers if answer.built]
@@ -265,12 +265,6 @@ def lab(
     _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
-    if getattr(model, "between", None) is not None:
-        click.echo(
-            "No report: its derivation begins with a difference equation, which this model has not",
-            err=True,
-        )
-        return
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
         write_report(chosen, result, place, language, [*known.values()], modes)
@@ -289,12 +283,10 @@ def _tell(result: Comparison, to_error: bool) -> None:
         size = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else size}")
     if result.scored:
-        lines.append("Predictions of the measurement, mean over the steps ± standard error:")
-        lines.append(f"{'':<18} {'log score':>19} {'CRPS':>19}")
-    for name in result.names if result.scored else ():
-        both = [score(name, steps=slice(None)) for score in (result.log_score, result.crps)]
-        shown = [f"{float(mean.value):10.4f} ± {float(mean.standard_error):.4f}" for mean in both]
-        lines.append(f"{title(name):<18} {shown[0]:>19} {shown[1].replace('nan ± nan', '-'):>19}")
+        lines.append("Predictions of the measurement, mean over the steps and 95 % interval:")
+        rows = [["", "log score", f"below {title(result.reference)}", "CRPS"]]
+        rows += [[title(name), *score_cells(result, name)] for name in result.names]
+        lines += ["{:<18} {:>19} {:>19} {:>19}".format(*row) for row in rows]
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 
@@ -356,7 +348,6 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
 @click.option(
     "--jobs", type=click.IntRange(min=1), help="Does not change the results.  [default: all cores]"
 )
-@click.option("--dask", help="Address of a Dask scheduler whose workers check instead.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -370,12 +361,9 @@ def variants(
     seed: int,
     runs: int,
     jobs: int | None,
-    dask: str | None,
     out: Path | None,
 ) -> None:
     """List the variants of the lab, check them, or propose new ones."""
-    if dask and not check:
-        raise click.UsageError("--dask goes with --check")
     if wanted is not None and (check or names or variants_file):
         raise click.UsageError("--generate goes with --seed, --runs, --jobs and --out only")
     if wanted is None and out:
@@ -392,7 +380,7 @@ def variants(
     good = not faults
     if check and chosen:
         qualities = list(
-            quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed, dask)
+            quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed)
         )
         click.echo(quality.table(qualities))
         good &= all(examined.well_posed for examined in qualities)

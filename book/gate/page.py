@@ -93,17 +93,20 @@ class Letters:
     def __init__(
         self,
         worlds: Sequence[str | Callable[[np.random.Generator], Mapping[str, Any]]] = (),
-        said: Mapping[str, Sequence[str]] = MappingProxyType({}),
+        verdicts: Mapping[str, Sequence[str]] = MappingProxyType({}),
         equals: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        makers = [world(one) if isinstance(one, str) else one for one in worlds]
+        makers = [world(entry) if isinstance(entry, str) else entry for entry in worlds]
         self.worlds = [[make(np.random.default_rng(seed)) for seed in _SEEDS] for make in makers]
-        self.said = {normal(text): what for what, texts in said.items() for text in texts}
+        self.said = {normal(text): what for what, texts in verdicts.items() for text in texts}
         self.equals = {
             normal(text): f"{normal(text)} = {normal(other)}" for text, other in equals.items()
         }
         self.labels = {
-            text: what for what, texts in said.items() for text in texts if text.startswith("eq-")
+            text: what
+            for what, texts in verdicts.items()
+            for text in texts
+            if text.startswith("eq-")
         }
         self.indices = {
             key
@@ -151,7 +154,7 @@ class Letters:
             ]
             return [self._judged(self.equals.get(piece, piece), formula) for piece in new]
         if formula.kind == "sentence":
-            return [said for piece in self.related(formula) for said in self.read(piece)]
+            return [verdict for piece in self.related(formula) for verdict in self.read(piece)]
         return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.says(piece)]
 
     @staticmethod
@@ -224,7 +227,7 @@ def _sets(piece: str) -> bool:
     return all(
         len(side) == 1
         or (side[0] == "-" and len(side) == 2)
-        or not any(one.strip("\\").isalpha() for one in side)
+        or not any(entry.strip("\\").isalpha() for entry in side)
         for side in sides
     )
 
@@ -321,7 +324,9 @@ def _printed(code: str) -> Iterator[Formula]:
 
 def _texts(nodes: Iterable[ast.expr]) -> list[str]:
     return [
-        one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)
+        entry.value
+        for entry in nodes
+        if isinstance(entry, ast.Constant) and isinstance(entry.value, str)
     ]
 
 
@@ -358,7 +363,9 @@ def typed_numbers(text: str) -> Iterator[str]:
                 *([value / 100, 1 - value / 100] if value % 100 else []),
             ]
             if not any(
-                np.isclose(one, abs(other), rtol=1e-9, atol=0) for one in backing for other in known
+                np.isclose(entry, abs(other), rtol=1e-9, atol=0)
+                for entry in backing
+                for other in known
             ):
                 yield number
 
@@ -402,7 +409,7 @@ def outside_points(text: str) -> str:
     return "|".join(f" {normal(latex)} " for latex in typed)
 
 
-def mark(said: Sequence[Said]) -> str:
+def mark(verdicts: Sequence[Said]) -> str:
     """The words under a display: what its relations are, each once."""
-    computed = "✓ " if said and all(one.computed for one in said) else ""
-    return computed + "; ".join(dict.fromkeys(one.what for one in said))
+    computed = "✓ " if verdicts and all(entry.computed for entry in verdicts) else ""
+    return computed + "; ".join(dict.fromkeys(entry.what for entry in verdicts))

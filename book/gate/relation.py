@@ -5,7 +5,8 @@ r"""Reads a relation as it is printed, in LaTeX, and computes its sides while it
     holds(r"p_k=(I-K_kH)\Psi_k", {"p": Indexed(p), ..., "H": H, "I": I, "k": range(1, 4)})
 
 The letters are numbers: floats, matrices (n, m) (a column is (n, 1)), functions, `Indexed` values,
-a `range` for an index that runs, `Of` for what depends on an index or on a variable of integration.
+`At` for functions that have a value without brackets, a `range` for an index that runs, `Of` for
+what depends on an index or on a variable of integration.
 A letter may be any piece of LaTeX (`p(x_k\mid y_{0:k})`): the longest that fits is taken.  Read are
 + - / products and powers, ^T and ^{-1}, functions, \frac, \sqrt, |x|, matrices, \sum, \prod and
 \int, and the relations = \approx \le \ge < > \propto \leftarrow.  What is written z\leftarrow on
@@ -23,6 +24,7 @@ import numpy as np
 
 from gate.tex import CLOSE, OPEN, RELATIONS, normal
 from gate.values import (
+    At,
     Indexed,
     Of,
     Operator,
@@ -308,6 +310,9 @@ class Reader:
                 if follows == "_":
                     return key
                 key = key._replace(value=key.value.plain)
+            if isinstance(key.value, At):
+                called = self._is_call(len(key.words))
+                key = key._replace(value=key.value.function if called else key.value.plain)
             if key.value is not None and follows not in ("'", "_"):
                 return key
         return None
@@ -323,6 +328,8 @@ class Reader:
             self.take("_")
             indices = self._subscript(self._group())
             value = self.compute(lambda *places: key.value[tuple(map(whole, places))], *indices)
+            if isinstance(value, At):
+                value = value.function if self._is_call() else value.plain
             return self._applied(value) if callable(value) and self._is_call() else value
         if isinstance(value, Operator):
             return self.compute(value.function, self.product())
@@ -349,9 +356,10 @@ class Reader:
             return [self._inside([token]) for token in text]
         return [self._inside(text)]
 
-    def _is_call(self) -> bool:
-        """Does a bracket follow, perhaps after a power?"""
-        return self.next in ("(", "[") or (self.next == "^" and self._after(2) in ("(", "["))
+    def _is_call(self, words: int = 0) -> bool:
+        """Does a bracket follow so many words, perhaps after a power?"""
+        follows = self._after(words)
+        return follows in ("(", "[") or (follows == "^" and self._after(words + 2) in ("(", "["))
 
     def _applied(self, function: Callable[..., Any]) -> Value:
         power: list[str] = []

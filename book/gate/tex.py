@@ -47,12 +47,12 @@ def tokens(latex: str) -> list[str]:
         lambda word: word[0] if _scripted(latex, word.start()) else r" \qquad ",
         latex,
     )
-    found = [_SAME.get(one, one) for one in _TOKEN.findall(latex) if one not in _SPACE]
+    parts = [_SAME.get(token, token) for token in _TOKEN.findall(latex) if token not in _SPACE]
     inside, kept = 0, []
-    for one in found:
-        inside += (one == r"\begin") - (one == r"\end")
-        if one != "&" or inside:  # the columns of a matrix, not those of an alignment
-            kept.append(one)
+    for token in parts:
+        inside += (token == r"\begin") - (token == r"\end")
+        if token != "&" or inside:  # the columns of a matrix, not those of an alignment
+            kept.append(token)
     return kept
 
 
@@ -71,23 +71,25 @@ def normal(latex: str) -> str:
 def pieces(latex: str) -> list[str]:
     """The pieces of a formula that commas, spaces and lines separate, each without the mark that
     ends it."""
-    found: list[list[str]] = [[]]
+    parts: list[list[str]] = [[]]
     depth = 0
-    for one in normal(latex).split():
-        depth += (one in OPEN or one in ("{", r"\begin")) - (one in CLOSE or one in ("}", r"\end"))
-        if one in _BETWEEN and depth == 0:
-            found.append([])
+    for token in normal(latex).split():
+        depth += (token in OPEN or token in ("{", r"\begin")) - (
+            token in CLOSE or token in ("}", r"\end")
+        )
+        if token in _BETWEEN and depth == 0:
+            parts.append([])
         else:
-            found[-1].append(one)
-    texts = (" ".join(piece).removesuffix(" .").strip() for piece in found)
+            parts[-1].append(token)
+    texts = (" ".join(piece).removesuffix(" .").strip() for piece in parts)
     return [text for text in texts if text and text != "."]
 
 
 def is_relation(piece: str) -> bool:
     """Does this piece relate two sides, outside all brackets?"""
     depth = 0
-    for one in piece.split():
-        depth += (one in OPEN or one == "{") - (one in CLOSE or one == "}")
-        if depth == 0 and one in RELATIONS | _OTHERS:
+    for token in piece.split():
+        depth += (token in OPEN or token == "{") - (token in CLOSE or token == "}")
+        if depth == 0 and token in RELATIONS | _OTHERS:
             return True
     return False

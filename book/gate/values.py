@@ -37,6 +37,13 @@ class Indexed:
         return entry
 
 
+class At(NamedTuple):
+    """A function of what follows in brackets, and its value where none follow: f(x), f."""
+
+    function: Callable[..., Any]
+    plain: Value
+
+
 class Of:
     """What depends on letters that an index or an integral moves:
     `Of(density, "x_k", "x_{k-1}")`."""

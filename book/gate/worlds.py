@@ -15,6 +15,7 @@ A world is a text whose lines are done one after another::
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
     again:                             what follows, down to `then:`, again and again until nothing
                                        changes
+    entries: p                         p_{12} is in row 1 and column 2 of the matrix p
     keep: K, p                         forget all other letters; `forget: a, b` these
     "|v|" = \sqrt{v^Tv}                a letter that looks like something else; `"p(x|z)" of x =
                                        ...` moves with x
@@ -82,7 +83,7 @@ def _kind(line: str, stepped: set[str]) -> str:
     left, equals, _ = line.partition("=")
     if line in ("again:", "then:"):
         return line[:-1]
-    if not equals or line.startswith(("keep: ", "forget: ")):
+    if not equals or line.startswith(("keep: ", "forget: ", "entries: ")):
         return "draw"
     if left.startswith('"'):
         return "once"
@@ -97,6 +98,11 @@ def _drawn(
     if names == "forget":
         return {
             name: value for name, value in letters.items() if name not in what.strip().split(", ")
+        }
+    if names == "entries":
+        matrices = {name: letters[name] for name in what.strip().split(", ")}
+        return letters | {
+            name: Indexed(lambda i, j, A=A: A[i - 1, j - 1], A) for name, A in matrices.items()
         }
     if names == "keep":
         return {name: letters[name] for name in what.strip().split(", ")}
@@ -143,7 +149,7 @@ def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
     for _ in range(rounds):
         values = []
         for line in lines:
-            made = _made(*line.split("=", 1), letters)
+            made = _made(*re.fullmatch('((?:".*")?[^=]*)=(.*)', line).groups(), letters)
             letters |= made
             values += [np.array(value) for value in made.values() if not callable(value)]
         if before and all(
@@ -214,6 +220,15 @@ def column(values: Any) -> np.ndarray:
     return np.asarray(values, float).reshape(-1, 1)
 
 
+def shared_readings(rng: np.random.Generator) -> tuple[Any, ...]:
+    """Twelve states that share three measurements: their masses, the states, their means given the
+    measurement, and another function of it."""
+    mass, x = rng.dirichlet(np.ones(12)), rng.normal(size=12)
+    seen = np.repeat(np.arange(3), 4)
+    best = np.array([np.average(x[seen == y], weights=mass[seen == y]) for y in seen])
+    return mass, x, best, rng.normal(size=3)[seen]
+
+
 def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     r"""The letters A, H, Q, R, I and \\lambda, \\Psi, K, z, p, \\nu, F, y with the index k, from
     `kfcourse.filters.kalman`.
@@ -225,7 +240,7 @@ def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     Q, R = covariance(rng, states), covariance(rng, seen)
     system = LinearSystem(A, H, Q, R)
     law = Gaussian(rng.normal(size=states), covariance(rng, states))
-    found: dict[str, list[Any]] = {
+    series: dict[str, list[Any]] = {
         name: [] for name in (r"\lambda", r"\Psi", "y", "K", "z", "p", r"\nu", "F")
     }
     for _ in range(_STEPS):
@@ -240,10 +255,10 @@ def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
             posterior.cov,
             y - H @ law.mean,
         )
-        for name, value in zip(found, (*row, H @ law.cov @ H.T + R), strict=True):
-            found[name].append(column(value) if np.ndim(value) == 1 else value)
+        for name, value in zip(series, (*row, H @ law.cov @ H.T + R), strict=True):
+            series[name].append(column(value) if np.ndim(value) == 1 else value)
         law = predict(system, posterior)
-    letters = {name: Indexed(values, values[2]) for name, values in found.items()}
+    letters = {name: Indexed(values, values[2]) for name, values in series.items()}
     return {"A": A, "H": H, "Q": Q, "R": R, "I": np.eye(states), "k": K_RANGE} | letters
 
 
@@ -261,18 +276,15 @@ def _bent(turn: str, mixed: str) -> Model:
     )
 
 
-def _bent_scalar(turn: str, mixed: str) -> Model:
-    return Model.define(
-        f"0.8*x + {turn}*sin(x) + (0.4 + 0.1*x)*v",
-        f"x + {mixed}*x**2 + 0.5*w",
-        {},
-        prior={"mean": 0.5, "variance": 0.4},
-    )
-
-
-BENT, BENT_SCALAR = _bent("0.3", "0.2"), _bent_scalar("0.3", "0.2")
-# Other ones at each step: f_k is not f_{k+1}.
-BENT_LATER, BENT_SCALAR_LATER = _bent("0.1*k", "0.1*k"), _bent_scalar("0.1*k", "0.1*k")
+BENT = _bent("0.3", "0.2")
+BENT_SCALAR = Model.define(
+    "0.8*x + 0.3*sin(x) + (0.4 + 0.1*x)*v",
+    "x + 0.2*x**2 + 0.5*w",
+    {},
+    prior={"mean": 0.5, "variance": 0.4},
+)
+# Another one at each step: f_k is not f_{k+1}.
+BENT_LATER = _bent("0.1*k", "0.1*k")
 
 
 def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any]:
@@ -301,7 +313,7 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
     D_n = np.array(see.jacobian(model.w) * see.jacobian(model.w).T, dtype=float)
     ekf = aof(linearised(model))
     state = ekf.init(1)
-    found: dict[str, list[Any]] = {
+    series: dict[str, list[Any]] = {
         name: [] for name in (r"\lambda", r"\Psi", "y", "z", "p", "H", "K", r"\nu", r"\Phi", "g")
     }
     for k, y in enumerate(simulate(model, runs=1, steps=_STEPS, seed=int(rng.integers(1 << 30))).y):
@@ -310,10 +322,10 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
         H = slope(S[k], lam)
         K, nu = p @ H.T @ np.linalg.inv(D_n), column(y) - S[k](lam)
         row = (lam, Psi, column(y), z, p, H, K, nu, slope(f[k], z), noise[k](z) @ unmixed)
-        for name, value in zip(found, row, strict=True):
-            found[name].append(value)
-    found |= {"f": f, "S": S}
-    letters = {name: Indexed(values, values[2]) for name, values in found.items()}
+        for name, value in zip(series, row, strict=True):
+            series[name].append(value)
+    series |= {"f": f, "S": S}
+    letters = {name: Indexed(values, values[2]) for name, values in series.items()}
     return {r"D_\xi": D_xi, "D_n": D_n, "I": np.eye(len(model.x)), "k": K_RANGE} | letters
 
 
@@ -366,14 +378,14 @@ def chain_run(
     A plain program: every sum is a loop over the nodes; likelihood(y, x) is p(y | x).
     """
     size = range(len(nodes))
-    mass, rows = [float(one) for one in start], []
+    mass, rows = [float(share) for share in start], []
     for y in rng.normal(size=_STEPS):
         joint = [mass[j] * likelihood(y, nodes[j]) for j in size]
-        after = [one / sum(joint) for one in joint]
+        after = [share / sum(joint) for share in joint]
         z = sum(nodes[j] * after[j] for j in size)
         p = sum(nodes[j] ** 2 * after[j] for j in size) - z**2
         rows.append((Masses.of(mass), Masses.of(after), 1 / sum(joint), z, p, y))
         mass = [sum(after[i] * P[i, j] for i in size) for j in size]
     names = (r"\mu^-", r"\mu", "C", "z", "p", "y")
-    found = {name: Indexed([row[place] for row in rows]) for place, name in enumerate(names)}
-    return found | {"P": Indexed(P, P), "x": Indexed(nodes), "i": size, "j": size, "k": K_RANGE}
+    series = {name: Indexed([row[place] for row in rows]) for place, name in enumerate(names)}
+    return series | {"P": Indexed(P, P), "x": Indexed(nodes), "i": size, "j": size, "k": K_RANGE}

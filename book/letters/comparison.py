@@ -4,6 +4,7 @@ many measurements; point masses as a plain program, for a noise that enters line
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed, Operator
+from gate.worlds import shared_readings
 
 from kfcourse.filters import aof
 from kfcourse.symbolic.model import Model
@@ -13,10 +14,7 @@ from kfcourse.symbolic.structure import linearised
 def exact(rng):
     """The posterior mean is the mean of the states that share a measurement; any other function of
     it is an estimate."""
-    mass, x = rng.dirichlet(np.ones(12)), rng.normal(size=12)
-    seen = np.repeat(np.arange(3), 4)
-    best = np.array([np.average(x[seen == one], weights=mass[seen == one]) for one in seen])
-    other = rng.normal(size=3)[seen]
+    mass, x, best, other = shared_readings(rng)
     return {
         "x": Indexed([x]),
         "z": Indexed([other]),
@@ -47,9 +45,9 @@ def against_the_bound(rng):
 def linearised_start(rng):
     """The linearised AOF of the lab's model at its first measurement."""
     g, e = rng.uniform(0.5, 2, size=2)
-    one = aof(linearised(Model.define("0.9*x + e*x*v", "g*x + 0.3*x**2*w", {"g": g, "e": e})))
+    ekf = aof(linearised(Model.define("0.9*x + e*x*v", "g*x + 0.3*x**2*w", {"g": g, "e": e})))
     y = rng.normal()
-    state = one.step(one.init(1), np.array([[y]]))
+    state = ekf.step(ekf.init(1), np.array([[y]]))
     z, Psi = state.posterior.mean.item(), state.predicted.cov.item()
     return {"g": g, "e": e, "y": Indexed([y]), "z": Indexed([z]), r"\Psi": Indexed([1.0, Psi])}
 

@@ -1,41 +1,28 @@
-"""The letters of consistency.md: a run of the package's Kalman filter, in both notations."""
+"""The letters of consistency.md: squares of errors and innovations, in both notations."""
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Indexed
-from gate.worlds import covariance, kalman_run
+from gate.worlds import covariance
+
+course = r"""
+k: range 4
+F: list 4 pos
+\nu: nums 4
+s_k = \nu_k/\sqrt{F_k}
+"""
 
 
-def course(rng):
-    """Whitened innovations by the eigenvectors of a root: any root will do for the words, one
-    measurement has only one."""
-    run = kalman_run(rng, seen=1)
-    whitened = [nu / np.sqrt(F) for nu, F in zip(run[r"\nu"].values, run["F"].values, strict=True)]
-    return run | {"s": Indexed(whitened)}
-
-
-def western(rng):
-    run = kalman_run(rng, seen=2)
-    error = [rng.normal(size=(3, 1)) for _ in run["p"].values]
-    nees = [
-        (one.T @ np.linalg.solve(cov, one)).item()
-        for one, cov in zip(error, run["p"].values, strict=True)
-    ]
-    nis = [
-        (one.T @ np.linalg.solve(cov, one)).item()
-        for one, cov in zip(run[r"\nu"].values, run["F"].values, strict=True)
-    ]
-    ours = {
-        "P": Indexed(lambda k, _: run["p"].values[k]),
-        r"\tilde x": Indexed(lambda k, _: error[k]),
-    }
-    return ours | {
-        r"\epsilon": Indexed(nees),
-        r"\epsilon^\nu": Indexed(nis),
-        r"\nu": run[r"\nu"],
-        "S": run["F"],
-        "k": run["k"],
-    }
+western = r"""
+k: range 4
+p: list 4 cov 3
+e: list 4 any 3
+S: list 4 cov 2
+\nu: list 4 any 2
+\epsilon_k = \operatorname{tr}(p_k^{-1}e_ke_k^T)
+\epsilon^\nu_k = \operatorname{tr}(S_k^{-1}\nu_k\nu_k^T)
+"P_{k\mid k}" of k = p_k
+"\tilde x_{k\mid k}" of k = e_k
+"""
 
 
 constant_gain = r"""
@@ -63,7 +50,7 @@ def spread(cov):
 def of_points(rng):
     """Means over points that have the covariances of the normal laws."""
     p, P, K, H = covariance(rng, 2), covariance(rng, 3), rng.normal(size=(2, 1)), rng.normal(size=2)
-    Phi, one = rng.normal(size=(2, 2)), covariance(rng, 2)
+    Phi, mixed = rng.normal(size=(2, 2)), covariance(rng, 2)
     H = H[None]
     joint = np.block([[P[:2, :2], np.zeros((2, 1))], [np.zeros((1, 2)), P[2:, 2:]]])
     pairs = []
@@ -72,14 +59,14 @@ def of_points(rng):
         nu = H @ e + n
         pairs.append(((H @ Phi @ (e - K @ nu)) * nu, nu * nu, e * nu))
     product, F, gain = (np.mean(values, axis=0) for values in zip(*pairs, strict=True))
-    nees = [e.T @ np.linalg.solve(p, e) for e in spread(one)]
-    traces = [np.trace(np.linalg.solve(p, e @ e.T)) for e in spread(one)]
+    nees = [e.T @ np.linalg.solve(p, e) for e in spread(mixed)]
+    traces = [np.trace(np.linalg.solve(p, e @ e.T)) for e in spread(mixed)]
     means = {
         r"\mathsf M(e^Tp^{-1}e)": np.mean(nees),
         r"\mathsf M\operatorname{tr}(p^{-1}ee^T)": np.mean(traces),
         r"\mathsf M(\nu_{k+1}\nu_k)": product.item(),
     }
-    known = {"p": p, "P": one, "H": H, r"\Phi": Phi, "K": K, "F": F.item(), "K_*": gain / F}
+    known = {"p": p, "P": mixed, "H": H, r"\Phi": Phi, "K": K, "F": F.item(), "K_*": gain / F}
     return known | means | {r"\operatorname{tr}": np.trace}
 
 

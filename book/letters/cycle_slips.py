@@ -8,26 +8,31 @@ from scipy.integrate import quad, solve_ivp
 from scipy.special import iv
 
 
-def slips(rng):
-    """tau(0) = 1/q int_0^{2 pi} e^V(x) int_0^x e^-V(s) ds dx, the solution with tau = 0 at +-2
+def mean_time(V, q):
+    """1/q int_0^{2 pi} e^V(x) int_0^x e^-V(s) ds dx: Pontryagin's solution with tau = 0 at +-2
     pi."""
+
+    def inner(x):
+        return quad(lambda s: np.exp(-V(s)), 0, x, epsabs=0, epsrel=1e-12, limit=200)[0]
+
+    halves = (0, np.pi), (np.pi, 2 * np.pi)
+    return (
+        sum(
+            quad(lambda x: np.exp(V(x)) * inner(x), *half, epsabs=0, epsrel=1e-11, limit=400)[0]
+            for half in halves
+        )
+        / q
+    )
+
+
+def slips(rng):
     variance, q = rng.uniform(0.06, 0.12), rng.uniform(0.01, 0.1)
 
     def V(x):
         return (1 - np.cos(x)) / variance
 
-    inner = lambda x: quad(lambda s: np.exp(-V(s)), 0, x, epsabs=0, epsrel=1e-12, limit=200)[0]  # noqa: E731
-    tau = (
-        quad(lambda x: np.exp(V(x)) * inner(x), 0, 2 * np.pi, epsabs=0, epsrel=1e-11, limit=400)[0]
-        / q
-    )
-    return {
-        r"\tau": tau,
-        "q": q,
-        r"\sigma_\varphi": np.sqrt(variance),
-        "V": Of(V, r"\Delta"),
-        "I_0": lambda x: iv(0, x),
-    }
+    known = {r"\tau": mean_time(V, q), "q": q, r"\sigma_\varphi": np.sqrt(variance)}
+    return known | {"V": Of(V, r"\Delta"), "I_0": lambda x: iv(0, x)}
 
 
 loop = r"""
@@ -41,22 +46,18 @@ p = 1/(1/\Psi+1/r)
 then:
 \sigma_\varphi = \sqrt{(p+\Psi)/2}
 U'(x) = \cos(x)/r
-keep: A, D_n, q, r, p, \Psi, \sigma_\varphi, U'
+keep: q, r, p, \Psi, \sigma_\varphi, U'
 """
 
 
 def saw(rng):
-    """The same double integral for the potential of a saw, with its edge at half a cycle."""
+    """The potential of a saw, with its edge at half a cycle."""
     variance, q = rng.uniform(0.05, 0.1), rng.uniform(0.01, 0.1)
 
     def V(x):
         return ((x + np.pi) % (2 * np.pi) - np.pi) ** 2 / (2 * variance)
 
-    inner = lambda x: quad(  # noqa: E731
-        lambda s: np.exp(-V(s)), 0, x, points=[min(x, 5 * np.sqrt(variance))], limit=200
-    )[0]
-    tau = quad(lambda x: np.exp(V(x)) * inner(x), 0, 2 * np.pi, points=[np.pi], limit=400)[0] / q
-    return {r"\tau": tau, "q": q, r"\sigma_\varphi": np.sqrt(variance)}
+    return {r"\tau": mean_time(V, q), "q": q, r"\sigma_\varphi": np.sqrt(variance)}
 
 
 def pushed(rng):

@@ -3,8 +3,7 @@ characteristic of a carrier."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Of
-from gate.worlds import K_RANGE, column, covariance, given, slope
+from gate.worlds import covariance, slope
 
 C = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
@@ -13,65 +12,42 @@ def S(phi):
     return np.array([[phi[0, 0] + 0.2 * phi[1, 0] ** 2], [phi[0, 0] * phi[1, 0] + phi[1, 0]]])
 
 
-def f(x):
-    return np.array(
-        [[x[0, 0] + 0.3 * x[1, 0]], [0.9 * x[1, 0] + 0.1 * x[2, 0] ** 2], [x[2, 0] - 0.2 * x[0, 0]]]
-    )
-
-
-def run(rng):
-    """Rows of the gain form; u from the correction that it makes."""
-    law, Psi, D_n, D_xi, g = (
-        column(rng.normal(size=3)) / 2,
-        covariance(rng, 3) / 4,
-        covariance(rng, 2),
-        covariance(rng, 2),
-        rng.normal(size=(3, 2)),
-    )
-    names = (r"\lambda", r"\Psi", "y", "z", "p", "u", "S", "slope", r"\Phi")
-    rows = {name: [] for name in names}
-    for _ in range(5):
-        y, at = column(rng.normal(size=2)), slope(S, C @ law)
-        H = at @ C
-        K = Psi @ H.T @ np.linalg.inv(H @ Psi @ H.T + D_n)
-        z, p = law + K @ (y - S(C @ law)), (np.eye(3) - K @ H) @ Psi
-        u = np.linalg.lstsq(p @ C.T, z - law, rcond=None)[0]
-        for name, value in zip(
-            names, (law, Psi, y, z, p, u, S(C @ law), at, slope(f, z)), strict=True
-        ):
-            rows[name].append(value)
-        law, Psi = f(z), slope(f, z) @ p @ slope(f, z).T + g @ D_xi @ g.T
-    letters = {name: Indexed(values) for name, values in rows.items() if name != "slope"}
-    slopes = Of(lambda k: rows["slope"][k], "k")
-    extra = {
-        "c": C,
-        "D_n": D_n,
-        r"D_\xi": D_xi,
-        "g": g,
-        "f": f,
-        "k": K_RANGE,
-        r"\Phi": Of(lambda k: rows[r"\Phi"][k], "k"),
-    }
-    return (
-        letters
-        | extra
-        | {"S_k'": slopes, r"\frac{\partial S_k(c\lambda_k)}{\partial\varphi}": slopes}
-    )
-
-
-def display(rng):
-    return run(rng) | {"S": Indexed([S] * 5)}
-
-
-def western(rng):
-    own = run(rng)
-    return {
-        r"\hat x": given(own[r"\lambda"], own["z"]),
-        "P": given(own[r"\Psi"], own["p"]),
-        "c": C,
-        "u": own["u"],
-        "k": own["k"],
-    }
+run = r"""
+c: any 2 3
+E: any 2 2
+b, d: any 2
+M: any 3 3
+D_n, D_\xi: cov 2
+g: any 3 2
+P: cov 3
+y: list 5 any 2
+l, a: any 3
+k: range 5
+s(x) = b+Ex+dx^Tx/9
+f(x) = Mx+ax^Tx/9
+\lambda_0 = l/9
+\Psi_0 = P/4
+Q_k = E+2d(c\lambda_k)^T/9        # the slope of s
+H_k = Q_kc
+K_k = \Psi_kH_k^T(H_k\Psi_kH_k^T+D_n)^{-1}
+p_k = \Psi_k-K_kH_k\Psi_k
+v_k = s(c\lambda_k)
+z_k = \lambda_k+K_k(y_k-v_k)
+u_k = (cp_kp_kc^T)^{-1}cp_k(z_k-\lambda_k)
+T_k = M+2az_k^T/9                  # of f
+\lambda_{k+1} = f(z_k)
+\Psi_{k+1} = T_kp_kT_k^T+gD_\xi g^T
+k: range 1 4
+"S_k" of k = v_k
+"S_k(c\lambda_k)" of k = v_k
+"S_k'" of k = Q_k
+"\frac{\partial S_k(c\lambda_k)}{\partial\varphi}" of k = Q_k
+"\Phi" of k = T_k
+"\hat x_{k\mid k}" of k = z_k
+"\hat x_{k\mid k-1}" of k = \lambda_k
+"P_{k\mid k}" of k = p_k
+forget: E, b, d, M, a, l, P, s, Q, H, K, v, T
+"""
 
 
 carrier = r"""
@@ -117,12 +93,7 @@ def log_likelihood(rng):
     return slopes | known | {"D_n": D_n, "y": y, "S": S(C @ x)}
 
 
-products = r"""
-a, \Delta: num
-"""
-
-
-LETTERS = (run, display, western, carrier, drifting, log_likelihood, products)
+LETTERS = (run, carrier, drifting, log_likelihood)
 SAID = {
     DEFINITION: [
         r"\varphi_{k+1}=\varphi_k+T\nu_k+s_\varphi v_{1,k}",

@@ -24,8 +24,8 @@ def measure(lam, Psi):
 def fitted(target, *regressors):
     """Slopes (1, r), offset and the variance left, by least squares."""
     rows = np.vstack([*regressors, np.ones(RUNS)])
-    found = np.linalg.lstsq(rows.T, target, rcond=None)[0]
-    return found[None, :-1], found[-1], np.var(target - found @ rows)
+    fit = np.linalg.lstsq(rows.T, target, rcond=None)[0]
+    return fit[None, :-1], fit[-1], np.var(target - fit @ rows)
 
 
 def windowed(rng):
@@ -45,30 +45,10 @@ def windowed(rng):
         following = 0.9 * x + 0.2 * np.sin(x) + 0.3 * rng.normal(size=RUNS)
         L, n, _ = fitted(following, tau(u[0], T))
         before = ahead or (1.0, 0.0)
-        rows.append(
-            {"y": y, "h": h, "G": G, "F": F}
-            | {
-                r"\lambda": lam,
-                r"\Psi": Psi,
-                r"\sigma": sigma,
-                "H": H.item(),
-                "e": e,
-                "z": z,
-                r"\zeta": np.array(zeta),
-                "u": u,
-            }
-            | {
-                r"\Gamma": Gamma,
-                r"\chi": np.full((1, RUNS), chi),
-                "T": T,
-                "L": before[0],
-                "n": before[1],
-                "y": y,
-                "h": h,
-                "G": G,
-                "F": F,
-            }
-        )
+        row = {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H.item(), "e": e, "z": z}
+        row |= {"y": y, "h": h, "G": G, "F": F, "L": before[0], "n": before[1], "u": u, "T": T}
+        window = {r"\zeta": np.array(zeta), r"\Gamma": Gamma, r"\chi": np.full((1, RUNS), chi)}
+        rows.append(row | window)
         ahead = L.item(), n
         lam, Psi, x = ahead[0] * tau(u[0], T) + n, Theta(u[0], T), following
     every = {name: Indexed([row[name] for row in rows]) for name in rows[0]}

@@ -1,14 +1,10 @@
-"""The letters of integration.md: runs of the package's filter of an axis, its Western form with
-matrices, the accelerometer."""
+"""The letters of integration.md: the filter of an axis and of three, its Western form with matrices,
+the accelerometer."""
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed, Of
-from gate.worlds import K_RANGE, column, covariance
-
-from kfcourse.filters.kalman import correct, predict
-from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem
+from gate.worlds import K_RANGE
 
 SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
 
@@ -19,7 +15,7 @@ def sensors(rng):
     S = [np.sin, np.cos, np.exp, np.tanh, np.cosh]
     slow, radio = (
         lam + eps,
-        [one(value) + noise for one, value, noise in zip(S, lam, n, strict=True)],
+        [signal(value) + noise for signal, value, noise in zip(S, lam, n, strict=True)],
     )
     y, at = rng.normal(size=2)
     step = 1e-20
@@ -68,49 +64,44 @@ y_{\mathrm{INS}} = V+\varepsilon
 """
 
 
-def western(rng, after=True):
-    """Three axes together, as Western books write it."""
-    system = LinearSystem(np.eye(3), -np.eye(3), covariance(rng, 3), covariance(rng, 3))
-    P, before = covariance(rng, 3), rng.normal(size=3)
-    ahead = predict(system, Gaussian(before, P))
-    gnss, ins = rng.normal(size=(2, 3))
-    found = correct(system, ahead, gnss - ins)
-    K = -found.cov @ np.linalg.inv(system.R)
-    return {
-        "P^-": ahead.cov,
-        "P": found.cov if after else P,
-        "Q": system.Q,
-        "R": system.R,
-        "H": system.H,
-        "I": np.eye(3),
-        "K": K,
-        r"\delta z": column(gnss - ins),
-        r"\delta\hat x^-": column(ahead.mean),
-        r"\delta\hat x": column(found.mean),
-        r"(\cdot)": column(gnss - ins + ahead.mean),
-        r"z_\text{GNSS}": column(gnss),
-        r"z_\text{INS}": column(ins),
-        r"\hat v": column(ins - found.mean),
-        r"v_\text{INS}": column(ins),
-        r"\delta\hat v": column(found.mean),
-    }
+western = r"""
+\delta\hat x^-, z_\text{GNSS}, z_\text{INS}: any 3
+R, P^-: cov 3
+I: eye 3
+H = -I
+v_\text{INS} = z_\text{INS}
+\delta z = z_\text{GNSS}-z_\text{INS}
+(\cdot) = \delta z+\delta\hat x^-
+P = ((P^-)^{-1}+R^{-1})^{-1}
+K = -PR^{-1}
+\delta\hat x = P((P^-)^{-1}\delta\hat x^--R^{-1}\delta z)
+\delta\hat v = \delta\hat x
+\hat v = z_\text{INS}-\delta\hat x
+G = H
+\Psi = P^-
+p = P
+F = \Psi+R
+"""
 
 
-def western_before(rng):
-    return western(rng, after=False)
+western_before = r"""
+P, Q: cov 3
+P^- = Q+P
+"""
 
 
-def together(rng):
-    """Three axes with one matrix."""
-    noise, drift, p = 0.7, 0.3, covariance(rng, 3)
-    found = {r"\Psi": [], "K": [], "p": []}
-    for _ in range(5):
-        before = p + drift**2 * np.eye(3) if found["p"] else p
-        p = np.linalg.inv(np.linalg.inv(before) + np.eye(3) / noise**2)
-        for name, value in zip(found, (before, -p / noise**2, p), strict=True):
-            found[name].append(value)
-    letters = {name: Indexed(values) for name, values in found.items()}
-    return letters | {r"\sigma_n": noise, r"\sigma_\xi": drift, "I": np.eye(3), "k": K_RANGE}
+together = r"""
+\sigma_n = 0.7
+\sigma_\xi = 0.3
+P: cov 3
+I: eye 3
+k: range 5
+\Psi_0 = P
+p_k = (\Psi_k^{-1}+I/\sigma_n^2)^{-1}
+K_k = -p_k/\sigma_n^2
+\Psi_{k+1} = p_k+\sigma_\xi^2I
+k: range 1 4
+"""
 
 
 settled = r"""
@@ -119,24 +110,16 @@ settled = r"""
 again:
 \Psi = 1/(1/\Psi+1/\sigma_n^2)+\sigma_\xi^2
 then:
-p = \Psi-\sigma_\xi^2
 """
 
 
-def stepping(rng):
-    """The motion between two readings, by a fine sum."""
-    T, s, V, eps, r = rng.uniform(0.5, 1, 5)
-    t = T / 2**12 * (np.arange(2**12) + 0.5)
-    return {
-        "T_a": T,
-        "s": s,
-        "V": V,
-        r"\varepsilon": eps,
-        r"y_{\mathrm{NR}}": r,
-        "s_k": s + np.mean(V + t * (r - eps)) * T,
-        "V_k": V + T * r - T * eps,
-        r"\varepsilon_k": eps,
-    }
+stepping = r"""
+T_a, s, V, \varepsilon, y_{\mathrm{NR}}: pos
+v(t) = V+t(y_{\mathrm{NR}}-\varepsilon)
+"s_k" = s+\int_0^{T_a}v(t)dt
+"V_k" = v(T_a)
+"\varepsilon_k" = \varepsilon
+"""
 
 
 accelerometer = r"""
@@ -154,17 +137,6 @@ slow_drift = r"""
 \sigma_n: in 1 2
 p = \sigma_\xi(\sqrt{\sigma_\xi^2+4\sigma_n^2}-\sigma_\xi)/2
 "\lim_{\sigma_\xi\to0}" = 1
-"""
-
-
-complementary = r"""
-\kappa = 0.4
-\sigma_\xi = 0.7
-\sigma_n = 1.3
-\mathsf De = 1
-again:
-\mathsf De = (1-\kappa)^2(\mathsf De+\sigma_\xi^2)+\kappa^2\sigma_n^2
-then:
 """
 
 
@@ -191,7 +163,7 @@ s_0 = 0
 s_{k+1} = (1-\kappa)s_k+\kappa(n_{k+1}-\varepsilon_{k+1})
 e_k = \varepsilon_k+s_k
 k: range 1 4
-keep: V, n, \varepsilon, \xi, \kappa, e, k
+keep: n, \xi, \kappa, e, k
 """
 
 
@@ -203,22 +175,7 @@ y_{\mathrm{SR}} = V+n
 """
 
 
-def lecture(rng):
-    """The general gain, and the lecture's."""
-    own = western(rng)
-    law = {
-        "G": own["H"],
-        r"\Psi": own["P^-"],
-        "p": own["P"],
-        "F": own["P^-"] + own["R"],
-        "K": own["P^-"] @ own["H"].T,
-    }
-    K = np.linalg.solve(law["F"], law["K"].T).T
-    return law | {"K": K, r"\tilde D": own["P^-"], "D": own["P"], "D_n": own["R"], "I": np.eye(3)}
-
-
 LETTERS = (
-    complementary,
     slow_drift,
     sensors,
     axis,
@@ -232,7 +189,6 @@ LETTERS = (
     together,
     settled,
     stepping,
-    lecture,
 )
 SAID = {
     DEFINITION: [

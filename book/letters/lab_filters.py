@@ -3,7 +3,7 @@ and a run of the package's."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Of, Operator
+from gate.values import Indexed, Of
 from gate.worlds import BENT, K_RANGE, extended_run
 
 from kfcourse.symbolic.structure import linearised
@@ -37,7 +37,7 @@ def ensemble(rng):
     x = [rng.normal(size=RUNS)]
     for _ in range(STEPS):
         x.append(a(x[-1], rng.normal(size=RUNS)))
-    return x, [b(one, rng.normal(size=RUNS)) for one in x]
+    return x, [b(part, rng.normal(size=RUNS)) for part in x]
 
 
 def fitted(target, regressor):
@@ -46,17 +46,17 @@ def fitted(target, regressor):
     return slope, offset, np.var(target - slope * regressor - offset)
 
 
-def covariance(one, other=None):
-    return np.cov(one, one if other is None else other, bias=True)[0, 1]
+def at_k(values):
+    return Of(lambda k: values[k], "k")
+
+
+def covariance(part, other=None):
+    return np.cov(part, part if other is None else other, bias=True)[0, 1]
 
 
 def collected(rows, **more):
-    names = list(rows[0])
-    return (
-        {name: Indexed([row[name] for row in rows]) for name in names}
-        | {"k": range(1, STEPS - 1)}
-        | more
-    )
+    known = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
+    return known | {"k": range(1, STEPS - 1)} | more
 
 
 def two_step(rng):
@@ -69,19 +69,8 @@ def two_step(rng):
         z = lam + np.polyval([H, e], omega)
         alpha = a(z, 0)
         F, g, _ = fitted(x[k + 1], alpha)
-        rows.append(
-            {
-                r"\lambda": lam,
-                r"\omega": omega,
-                "H": H,
-                "e": e,
-                "z": z,
-                r"\alpha": alpha,
-                "F": F,
-                "g": g,
-                "y": y[k],
-            }
-        )
+        row = {r"\lambda": lam, r"\omega": omega, "H": H, "e": e, "z": z, "y": y[k]}
+        rows.append(row | {r"\alpha": alpha, "F": F, "g": g})
         lam = np.polyval([F, g], alpha)
     return collected(rows, a=a, b=b, m_v=0.0, m_w=0.0)
 
@@ -99,44 +88,21 @@ def optimal_structure(rng):
         u = np.polyval([Gamma, chi], z)
         s = tau(u, T)
         L, n, _ = fitted(x[k + 1], s)
-        row = {
-            r"\lambda": lam,
-            r"\Psi": Psi,
-            r"\sigma": sigma,
-            "H": H,
-            "e": e,
-            "z": z,
-            "u": u,
-            "T": T,
-            "y": y[k],
-            "x": x[k],
-        }
-        rows.append(
-            row
-            | {
-                r"\Gamma": Gamma,
-                r"\chi": chi,
-                "s": tau(rows[-1]["u"], rows[-1]["T"]) if rows else s,
-                "hGFLn": (h, G, F, L, n),
-            }
-        )
+        row = {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H, "e": e, "z": z}
+        row |= {"h": h, "G": G, "F": F, "L": L, "n": n, r"\Gamma": Gamma, r"\chi": chi}
+        before = tau(rows[-1]["u"], rows[-1]["T"]) if rows else s
+        rows.append(row | {"u": u, "T": T, "x": x[k], "y": y[k], "s": before})
         lam, Psi = np.polyval([L, n], s), Theta(u, T)
-    parts = {
-        name: Of(lambda k, place=place: rows[k]["hGFLn"][place], "k")
-        for place, name in enumerate(("h", "G", "F", "L", "n"))
-    }
-    return (
-        collected(rows, tau=None)
-        | parts
-        | {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
-    )
+    known = collected(rows)
+    functions = {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
+    return known | functions | {name: at_k(known[name].values) for name in "hGFLn"}
 
 
 def plain_prediction(rng):
     """The prediction of the filter of optimal structure, without the second fit."""
     own = optimal_structure(rng)
     u, T = own["u"].values, own["T"].values
-    ahead = [tau(*one) for one in zip(u, T, strict=True)]
+    ahead = [tau(*part) for part in zip(u, T, strict=True)]
     return {
         "u": own["u"],
         "T": own["T"],
@@ -163,42 +129,34 @@ def optimal(rng):
     """The package's filter with several components."""
     own = extended_run(rng, BENT)
     H, lam, S, structure = own["H"].values, own[r"\lambda"].values, own["S"].plain, linearised(BENT)
-    F = [one @ Psi @ one.T + own["D_n"] for one, Psi in zip(H, own[r"\Psi"].values, strict=True)]
+    F = [part @ Psi @ part.T + own["D_n"] for part, Psi in zip(H, own[r"\Psi"].values, strict=True)]
 
     def moved(z, p):
         law = structure.predict(z.T, p[None])
         return law[0].T, law[1].reshape(p.shape)
 
     functions = {r"\tau": lambda z, p: moved(z, p)[0], r"\Theta": lambda z, p: moved(z, p)[1]}
-    at_k = {
-        "G": Of(lambda k: H[k], "k"),
-        "F": Of(lambda k: F[k], "k"),
-        "h": Of(lambda k: S(lam[k]), "k"),
-    }
+    h = [S(place) for place in lam]
     return (
         {name: own[name] for name in (r"\lambda", r"\Psi", "K", "z", "p", "y")}
         | functions
-        | at_k
-        | {"k": K_RANGE}
+        | {"G": at_k(H), "F": at_k(F), "h": at_k(h), "k": K_RANGE}
     )
 
 
-def western(rng):
-    own = extended_run(rng, BENT)
-    H, Psi, K, lam = (own[name].plain for name in ("H", r"\Psi", "K", r"\lambda"))
-    S = H @ Psi @ H.T + own["D_n"]
-    names = {
-        "P^-": Psi,
-        "P": own["p"].plain,
-        "H": H,
-        "S": S,
-        "F": S,
-        "C": Psi @ H.T,
-        "K": K,
-        "m": own["z"].plain,
-        "m^-": lam,
-    }
-    return names | {"y": own["y"].plain, r"\mu": own["S"].plain(lam)}
+western = r"""
+H: any 2 3
+P^-: cov 3
+R: cov 2
+m^-: any 3
+y, \mu: any 2
+P = ((P^-)^{-1}+H^TR^{-1}H)^{-1}
+K = PH^TR^{-1}
+m = P((P^-)^{-1}m^-+H^TR^{-1}(y-\mu+Hm^-))
+C = P^-H^T
+S = HC+R
+F = S
+"""
 
 
 regression = r"""
@@ -217,28 +175,11 @@ keep: C, F, G, h, K, \lambda, \Psi, y, z, \varepsilon, x
 """
 
 
-def linear_meter(rng):
-    """The first line of Pugachev's filter, fitted to all signs that the error of the state and the
-    noise can have."""
-    g, f, Psi = rng.uniform(0.5, 2, size=3)
-    off, w = np.sqrt(Psi) * np.array([1, 1, -1, -1]), f * np.array([1, -1, 1, -1])
-    lam = rng.normal()
-    x, y = lam + off, g * (lam + off) + w
-    H = np.polyfit(y - g * lam, off, 1)[0]
-    errors = {
-        "x": x,
-        "y": y,
-        r"\lambda": lam,
-        r"\omega": y - g * lam,
-        "b": lambda x, w: g * x + f * w,
-        "k": range(1),
-    }
-    spread = {r"\mathsf D": Operator(np.var), r"\mathsf{Cov}": covariance}
-    return (
-        errors
-        | spread
-        | {"g": g, "f": f, "d": Psi, r"\Psi": Indexed([Psi]), "R": f**2, "H": Indexed([H])}
-    )
+linear_meter = r"""
+\lambda, g, f, \omega: num
+y = \omega+g\lambda
+b(x, w) = gx+fw
+"""
 
 
 LETTERS = (

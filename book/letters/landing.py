@@ -2,11 +2,6 @@
 
 from gate.page import DEFINITION
 
-LETTERS = (
-    r"""
-E, x_1: pos
-""",
-)
 SAID = {
     DEFINITION: [
         r"\dot x_1=-E-g_0\sin x_2",

@@ -1,12 +1,10 @@
 """The letters of linearisation.md: runs of the package's extended filter of a scalar model and of
 vectors, and the same filter in Western letters."""
 
-from functools import partial
-
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed, Of
-from gate.worlds import BENT_LATER, BENT_SCALAR, BENT_SCALAR_LATER, extended_run, given, slope
+from gate.worlds import BENT_LATER, BENT_SCALAR, extended_run, given
 from scipy.stats import multivariate_normal
 
 
@@ -18,18 +16,18 @@ def _together(run, *names):
     return zip(*(run[name].values for name in names), strict=True)
 
 
-def scalar(rng, model=BENT_SCALAR):
+def scalar(rng):
     """A run, with the slopes and the noise of the object at the step."""
-    run = extended_run(rng, model)
+    run = extended_run(rng, BENT_SCALAR)
     S = [run["S"].plain(lam) for lam in run[r"\lambda"].values]
-    now = {"S'": run["H"].values, "f'": run[r"\Phi"].values, "g": run["g"].values, "S": S}
     off = [nu**2 / (H**2 * Psi + run["D_n"]) for nu, H, Psi in _together(run, r"\nu", "H", r"\Psi")]
-    at_any = {"x": Indexed(rng.normal(size=len(off))), "d": Indexed([-one / 2 for one in off])}
-    run |= at_any
-    same = {f"{name}_k'": partial(slope, run[name].plain) for name in "Sf"}
-    for matrix in ("H", r"\Phi", "I"):
-        del run[matrix]
-    return run | same | {name: at_k(values) for name, values in now.items()}
+    at_any = {
+        "x": Indexed(rng.normal(size=len(off))),
+        "d": Indexed([-square / 2 for square in off]),
+    }
+    now = {"S'": at_k(run["H"].values), "S": at_k(S)}
+    matrices = ("H", r"\Phi", "I")  # whose transpositions a scalar does not tell
+    return {name: run[name] for name in run if name not in matrices} | at_any | now
 
 
 def vector(rng):
@@ -79,12 +77,8 @@ k: range 3
 
 
 averaged = r"""
-z: num
 p: in .00001 .00002
 u: nodes 0 p
-g = \sin z
-g' = \cos z
-g'' = -\sin z
 """
 
 
@@ -99,14 +93,12 @@ S = \sin x
 
 meters = r"""
 p = 0.25
-S' = 6
-K = 0.15
+S'(x) = 2x
 """
 
 
 LETTERS = (
     scalar,
-    partial(scalar, model=BENT_SCALAR_LATER),
     vector,
     western,
     even,

@@ -11,7 +11,7 @@ NODES, WEIGHTS = hermegauss(5)  # exact for polynomials up to degree 9
 
 def gain(f, lam, Psi):
     """Of the best line for y = x + f x^2 w over x ~ N(lambda, Psi), by quadrature."""
-    x, w = (one.ravel() for one in np.meshgrid(lam + np.sqrt(Psi) * NODES, NODES))
+    x, w = (axis.ravel() for axis in np.meshgrid(lam + np.sqrt(Psi) * NODES, NODES))
     weight = np.outer(WEIGHTS, WEIGHTS).ravel() / WEIGHTS.sum() ** 2
     y = x + f * x**2 * w
     return weight @ ((x - lam) * (y - weight @ y)) / (weight @ (y - weight @ y) ** 2)

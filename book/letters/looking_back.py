@@ -19,17 +19,17 @@ def _record(rng):
         Gaussian(rng.normal(size=STATES), covariance(rng, STATES)),
         rng.normal(size=(STEPS, 1, SEEN)),
     )
-    found = run(system, prior, y)
-    back = smooth(system, found)
+    laws = run(system, prior, y)
+    back = smooth(system, laws)
     letters = {
-        "z": _columns(found.posterior.mean),
-        "p": Indexed(found.posterior.cov[:, 0]),
+        "z": _columns(laws.posterior.mean),
+        "p": Indexed(laws.posterior.cov[:, 0]),
         r"\bar z": _columns(back.mean),
         r"\bar p": Indexed(back.cov[:, 0]),
         "I": np.eye(STATES),
         "k": K_RANGE,
     }
-    return system, y, found, letters
+    return system, y, laws, letters
 
 
 def _columns(means):
@@ -37,10 +37,10 @@ def _columns(means):
 
 
 def course(rng):
-    system, _, found, letters = _record(rng)
-    p, Psi = found.posterior.cov[:, 0], found.predicted.cov[:, 0]
+    system, _, laws, letters = _record(rng)
+    p, Psi = laws.posterior.cov[:, 0], laws.predicted.cov[:, 0]
     return letters | {
-        r"\lambda": _columns(found.predicted.mean),
+        r"\lambda": _columns(laws.predicted.mean),
         r"\Psi": Indexed(Psi),
         "S": Indexed([np.linalg.solve(Psi[k + 1], system.A @ p[k]).T for k in range(STEPS - 1)]),
         "A": Indexed([system.A] * STEPS, system.A),

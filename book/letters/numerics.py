@@ -1,4 +1,4 @@
-"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array."""
+"""The letters of numerics.md: corrections of the package, and the array."""
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
@@ -34,34 +34,25 @@ def _corrected(rng, seen):
     }
 
 
-def any_gain(rng):
-    """Cov((I - K H) e - K w) for a gain that is not the optimal one."""
-    found = _corrected(rng, 2)
-    K = rng.normal(size=(3, 2))
-    both = np.hstack([np.eye(3) - K @ found["H"], -K])
-    joint = np.block([[found[r"\Psi"], np.zeros((3, 2))], [np.zeros((2, 3)), found["R"]]])
-    return found | {"K": K, "p": both @ joint @ both.T}
-
-
 def wrong_gain(rng):
-    found = _corrected(rng, 1)
-    return found | {
+    known = _corrected(rng, 1)
+    return known | {
         r"\epsilon": 0.3,
         r"\gamma": rng.normal(size=(3, 1)),
-        "F": found["H"] @ found[r"\Psi"] @ found["H"].T + found["R"],
+        "F": known["H"] @ known[r"\Psi"] @ known["H"].T + known["R"],
     }
 
 
 def array(rng):
     """The orthogonal matrix by NumPy's QR decomposition, for the correction and for the
     prediction."""
-    found = _corrected(rng, 2)
-    S, Q = np.linalg.cholesky(found[r"\Psi"]), covariance(rng, 3)
-    wide = np.block([[np.linalg.cholesky(found["R"]), found["H"] @ S], [np.zeros((3, 2)), S]])
+    known = _corrected(rng, 2)
+    S, Q = np.linalg.cholesky(known[r"\Psi"]), covariance(rng, 3)
+    wide = np.block([[np.linalg.cholesky(known["R"]), known["H"] @ S], [np.zeros((3, 2)), S]])
     T, right = np.linalg.qr(wide.T)
-    ahead = np.hstack([found["A"] @ S, np.linalg.cholesky(Q)])
+    ahead = np.hstack([known["A"] @ S, np.linalg.cholesky(Q)])
     turned, root = np.linalg.qr(ahead.T)
-    return found | {
+    return known | {
         "S": S,
         "Q": Q,
         "T": T,
@@ -70,30 +61,22 @@ def array(rng):
         "Z": right.T[2:, 2:],
         "S'": root.T,
         "T'": turned,
-        "F": np.linalg.solve(np.eye(2) - found["H"] @ found["K"], found["R"]),
+        "F": np.linalg.solve(np.eye(2) - known["H"] @ known["K"], known["R"]),
     }
 
 
-def one_measurement(rng):
-    """A scalar measurement, and the prediction's root in the words of the text."""
-    own, scalar = array(rng), _corrected(rng, 1)
-    F = scalar["H"] @ scalar[r"\Psi"] @ scalar["H"].T + scalar["R"]
+def in_words(rng):
+    """The prediction's root in the words of the text."""
+    own = array(rng)
     wide = np.hstack([own["A"] @ own["S"], np.linalg.cholesky(own["Q"])])
-    T, _ = np.linalg.qr(wide.T, mode="complete")
-    turned = {
+    return {
         r"(AS\;\;Q^{1/2})": wide,
-        "T": T,
+        "T": np.linalg.qr(wide.T, mode="complete")[0],
         r"(S'\;\;0)": np.hstack([own["S'"], np.zeros((3, 3))]),
     }
-    return turned | {
-        "p": scalar["p"],
-        r"\Psi": scalar[r"\Psi"],
-        "R": scalar["R"].item(),
-        "F": F.item(),
-    }
 
 
-LETTERS = (any_gain, wrong_gain, array, one_measurement)
+LETTERS = (wrong_gain, array, in_words)
 _BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
 _AFTER = r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}"
 _BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"

@@ -23,8 +23,8 @@ F = G\Psi G^T+R
 """
 
 
-scalar = r"""
-w = 1
+doubtful = r"""
+w = 0.3
 \Psi, R: pos
 \nu: num
 F = \Psi+R/w
@@ -34,10 +34,7 @@ s = \nu/\sqrt F
 """
 
 
-doubtful = scalar.replace("w = 1", "w = 0.3")
-
-
-LETTERS = (doubting, scalar, doubtful)
+LETTERS = (doubting, doubtful)
 SAID = {
     NOTATION: [
         "w=1",

@@ -5,20 +5,11 @@ import numpy as np
 from gate.page import DEFINITION
 from gate.values import Indexed, Of, Operator, Unread
 from gate.worlds import column, covariance, slope
-from scipy.stats import multivariate_normal
 
 
 def S(x):
-    x = np.ravel(x)
-    return (
-        column(np.array([x[0] + 0.2 * x[1] ** 2, x[1] * x[2] + x[2]], dtype=x.dtype))
-        if x.dtype != complex
-        else _complex(x)
-    )
-
-
-def _complex(x):
-    return np.array([[x[0] + 0.2 * x[1] ** 2], [x[1] * x[2] + x[2]]])
+    a, b, c = np.ravel(x)
+    return np.array([[a + 0.2 * b**2], [b * c + c]])
 
 
 def given(rng):
@@ -39,38 +30,20 @@ def iterated(rng, rounds=3):
         slopes.append(H)
         gains.append(p @ H.T @ np.linalg.inv(D_n))
         places.append(lam + gains[-1] @ (y - S(places[-1]) - H @ (lam - places[-1])))
-    at_i = {
-        "H": Of(lambda i: slopes[i], "i"),
-        "K": Of(lambda i: gains[i], "i"),
-        r"\partial S(x_i)/\partial x": Of(lambda i: slopes[i], "i"),
-    }
-    return at_i | {
-        "x": Indexed(places),
-        r"\lambda": lam,
-        r"\Psi": Psi,
-        "y": y,
-        "D_n": D_n,
-        "S": S,
-        "i": range(rounds),
-    }
+    slopes, gains = (Of(lambda i, rows=rows: rows[i], "i") for rows in (slopes, gains))
+    at_i = {"H": slopes, "K": gains, r"\partial S(x_i)/\partial x": slopes, "x": Indexed(places)}
+    return at_i | {r"\lambda": lam, r"\Psi": Psi, "D_n": D_n, "S": S, "y": y, "i": range(rounds)}
 
 
 def settled(rng):
     """The end of the iteration, and what is made of it."""
     own = iterated(rng, 200)
-    H, Psi = slope(S, own["x"].values[-1]), own[r"\Psi"]
-    p = np.linalg.inv(np.linalg.inv(Psi) + H.T @ np.linalg.inv(own["D_n"]) @ H)
-    K = p @ H.T @ np.linalg.inv(own["D_n"])
-    return {
-        "z": own["x"].values[-2],
-        "x": own["x"],
-        "i": range(200, 201),
-        "p": p,
-        "I": np.eye(3),
-        "K": K,
-        "H": H,
-        r"\Psi": Psi,
-    }
+    *_, z, x = own["x"].values
+    H, Psi, D_n = slope(S, x), own[r"\Psi"], own["D_n"]
+    p = np.linalg.inv(np.linalg.inv(Psi) + H.T @ np.linalg.inv(D_n) @ H)
+    K = p @ H.T @ np.linalg.inv(D_n)
+    known = {"z": z, "x": own["x"], "i": range(200, 201), r"\Psi": Psi}
+    return known | {"p": p, "I": np.eye(3), "K": K, "H": H}
 
 
 def points(rng):
@@ -91,55 +64,22 @@ def points(rng):
     F = sum(w(i) * S(chi(i)) @ S(chi(i)).T for i in every) - h @ h.T + D_n
     C = sum(w(i) * chi(i) @ S(chi(i)).T for i in every) - lam @ h.T
     K = np.linalg.solve(F, C.T).T
-    law = {
-        r"\lambda": lam,
-        r"\Psi": Psi,
-        "y": y,
-        "D_n": D_n,
-        "S": S,
-        "h": h,
-        "F": F,
-        "C": C,
-        "K": K,
-    }
-    after = {
-        "z": lam + C @ np.linalg.solve(F, y - h),
-        "p": Psi - C @ np.linalg.solve(F, C.T),
-        "G": np.linalg.solve(Psi, C).T,
-    }
-    return (
-        law
-        | after
-        | {
-            r"\chi": Indexed(chi),
-            "w": Indexed(w),
-            "n": n,
-            r"\kappa": kappa,
-            "j": every,
-            "i": range(1, n + 1),
-        }
-    )
+    law = {r"\lambda": lam, r"\Psi": Psi, "y": y, "D_n": D_n, "S": S}
+    law |= {"h": h, "F": F, "C": C, "K": K, "G": np.linalg.solve(Psi, C).T}
+    law |= {"z": lam + K @ (y - h), "p": Psi - C @ np.linalg.solve(F, C.T)}
+    places = {r"\chi": Indexed(chi), "w": Indexed(w), "n": n, r"\kappa": kappa}
+    return law | places | {"j": every, "i": range(1, n + 1)}
 
 
-def posterior(rng):
-    lam, Psi, y, D_n = given(rng)
-
-    def J(x):
-        laws = (
-            (multivariate_normal(cov=Psi), (x - lam).ravel()),
-            (multivariate_normal(cov=D_n), (y - S(x)).ravel()),
-        )
-        return sum(law.logpdf(off) - law.logpdf(0 * off) for law, off in laws)
-
-    return {
-        "J": J,
-        "x": column(rng.normal(size=3)),
-        r"\lambda": lam,
-        r"\Psi": Psi,
-        "y": y,
-        "D_n": D_n,
-        "S": S,
-    }
+posterior = r"""
+A: any 2 3
+b, y: any 2
+x, \lambda: any 3
+\Psi: cov 3
+D_n: cov 2
+S(x) = Ax+bx^Tx
+J(x) = \ln(\mathcal N(x;\lambda,\Psi)\mathcal N(y;S(x),D_n)/(\mathcal N(x;x,\Psi)\mathcal N(y;y,D_n)))
+"""
 
 
 def one_component(rng):

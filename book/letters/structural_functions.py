@@ -26,7 +26,7 @@ def of_package(structure, z, p):
     at = structure.measure(np.full((1, 1), z), np.full((1, 1, 1), p))
     moved = structure.predict(np.full((1, 1), z), np.full((1, 1, 1), p))
     names = (r"\tau", r"\Theta", "h", "G", "F")
-    return dict(zip(names, (one.item() for one in (*moved, at.h, at.G, at.F)), strict=True))
+    return dict(zip(names, (value.item() for value in (*moved, at.h, at.G, at.F)), strict=True))
 
 
 def by_tangents(rng):
@@ -124,8 +124,8 @@ def variant(rng):
         "linearised": of_package(linearised(own), z, p),
     }
     values = {
-        rf"{name}_\text{{{way}}}": found[key]
-        for way, found in both.items()
+        rf"{name}_\text{{{way}}}": functions[key]
+        for way, functions in both.items()
         for name, key in ((r"\Theta", r"\Theta"), ("F", "F"))
     }
     return values | {"e": e, "f": f, "p": p, "d": p, "m": z}

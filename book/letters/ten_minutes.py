@@ -33,7 +33,9 @@ def variant(rng):
     exec(re.search(r"model = Model.*?\n\)", CODE, re.DOTALL)[0], space)
     model, numbers = space["model"], rng.normal(size=3)
     here = dict(zip((*model.x, *model.v, *model.w), numbers, strict=True)) | model.values
-    x_next, y = (float(one[0].subs(here)) for one in (model.state_equation, model.meter_equation))
+    x_next, y = (
+        float(formula[0].subs(here)) for formula in (model.state_equation, model.meter_equation)
+    )
     return _letters(numbers[0], x_next, y, *numbers[1:]) | {
         str(name): float(value) for name, value in model.values.items()
     }

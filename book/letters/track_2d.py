@@ -4,7 +4,7 @@ mean given measurements."""
 import numpy as np
 from gate.page import DEFINITION, NOTATION
 from gate.values import Indexed, Operator
-from gate.worlds import K_RANGE, column, covariance
+from gate.worlds import K_RANGE, column, covariance, shared_readings
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import run
@@ -18,40 +18,26 @@ def _run(rng, lost=None):
     y, u = rng.normal(size=(5, 1, 2)), rng.normal(size=(5, 1, 2))
     if lost is not None:
         y[lost] = np.nan
-    found = run(system, Gaussian(rng.normal(size=4), covariance(rng, 4)), y, u)
+    laws = run(system, Gaussian(rng.normal(size=4), covariance(rng, 4)), y, u)
     (z, p), (lam, Psi) = (
-        ([column(one[0]) for one in law.mean], [one[0] for one in law.cov])
-        for law in (found.posterior, found.predicted)
+        ([column(part[0]) for part in law.mean], [part[0] for part in law.cov])
+        for law in (laws.posterior, laws.predicted)
     )
     return system, y, u, z, p, lam, Psi
 
 
 def filtered(rng):
     system, y, u, z, p, lam, Psi = _run(rng)
-    K = [one @ system.H.T @ np.linalg.inv(system.R) for one in p]
+    K = [part @ system.H.T @ np.linalg.inv(system.R) for part in p]
     F = [np.linalg.solve(np.eye(2) - system.H @ gain, system.R) for gain in K]
     nu = [
         np.linalg.lstsq(gain, after - before, rcond=None)[0]
         for gain, after, before in zip(K, z, lam, strict=True)
     ]
-    rows = {
-        "y": [column(one) for one in y],
-        "u": [column(one) for one in u],
-        "z": z,
-        "p": p,
-        r"\lambda": lam,
-        r"\Psi": Psi,
-    }
-    rows |= {"K": K, "F": F, r"\nu": nu}
-    fixed = {
-        "A": system.A,
-        "B": system.B,
-        "H": system.H,
-        "Q": system.Q,
-        "R": system.R,
-        "I": np.eye(4),
-    }
-    fixed |= {"S": INTENSITY, r"\Delta": DELTA, r"\sigma": SIGMA, "k": K_RANGE}
+    rows = {"y": [column(part) for part in y], "u": [column(part) for part in u], "z": z, "p": p}
+    rows |= {r"\lambda": lam, r"\Psi": Psi, "K": K, "F": F, r"\nu": nu}
+    fixed = {name: getattr(system, name) for name in "ABHQR"}
+    fixed |= {"I": np.eye(4), "S": INTENSITY, r"\Delta": DELTA, "k": K_RANGE}
     return fixed | {name: Indexed(values, values[2]) for name, values in rows.items()}
 
 
@@ -69,15 +55,9 @@ R = \sigma^2I
 
 def no_news(rng):
     """The mean of the states that share a measurement, and any other function of it."""
-    mass, x = rng.dirichlet(np.ones(12)), rng.normal(size=12)
-    seen = np.repeat(np.arange(3), 4)
-    best = np.array([np.average(x[seen == one], weights=mass[seen == one]) for one in seen])
-    return {
-        "x": x,
-        r"\lambda": best,
-        r"\lambda'": rng.normal(size=3)[seen],
-        r"\mathsf M": Operator(lambda values: float(mass @ values)),
-    }
+    mass, x, best, other = shared_readings(rng)
+    mean = Operator(lambda values: float(mass @ values))
+    return {"x": x, r"\lambda": best, r"\lambda'": other, r"\mathsf M": mean}
 
 
 LETTERS = (filtered, sample_lost, axes, no_news)

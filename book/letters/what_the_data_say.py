@@ -25,15 +25,15 @@ def wandering(rng):
         state_noise={"variance": q},
         meter_noise={"variance": r},
     )
-    one, y = kalman_filter(model), rng.normal(size=N + 1)
+    filter_, y = kalman_filter(model), rng.normal(size=N + 1)
     at = np.arange(N + 1)
     states = d + q * np.minimum(at[:, None], at)
     law = states + r * np.eye(N + 1)
-    nu, F = innovations(one.structure.measure, predictions(one, y), y[:, None, None])
+    nu, F = innovations(filter_.structure.measure, predictions(filter_, y), y[:, None, None])
     log_density = multivariate_normal(np.zeros(N + 1), law).logpdf(y)
     gain = states @ np.linalg.inv(law)
     z, p = gain @ y, states - gain @ states
-    back, own = smooth(one, y), run(one, y).cov.ravel()
+    back, own = smooth(filter_, y), run(filter_, y).cov.ravel()
     expected = np.mean(np.diff(z) ** 2 + np.diag(p)[1:] + np.diag(p)[:-1] - 2 * np.diag(p, 1))
     letters = {
         r"\ln L": log_density,

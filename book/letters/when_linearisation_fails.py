@@ -4,30 +4,6 @@ quadrature."""
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.worlds import world
 
-course = r"""
-\lambda: num
-\Psi, S'': in .2 .5
-D_n: in .3 .6
-a: in 1 2
-S' = -a
-x: nodes \lambda \Psi
-u(x) = 1+S'(x-\lambda)+S''(x-\lambda)^2/2
-H = S'^2\Psi+D_n
-K = \Psi S'/H
-p = \Psi D_n/H
-\kappa = \sqrt{4(\mathsf M(x-\lambda-K(u(x)-1))^2/p+K^2D_n/p-1)/3}
-q = \mathsf Du(x)
-S = 1
-h = \mathsf Mu(x)
-F = q+D_n
-G = \mathsf M(x-\lambda)u(x)/\Psi
-c = \sqrt{2(q-S'^2\Psi)/D_n}
-s = \sqrt{S'^2\Psi/D_n}
-\nu = c/s
-keep: S', S'', S, h, F, G, \Psi, D_n, s, c, \nu, \kappa
-"""
-
-
 display = r"""
 \lambda: num
 \Psi, S'': in .2 .5
@@ -56,7 +32,7 @@ keep: S', S'', S, h, F, G, \Psi, D_n, s, c, \nu, \kappa, t, S(x), S(\lambda)
 
 
 def western(rng):
-    own = world(course)(rng)
+    own = world(display)(rng)
     names = {r"\Psi": "P^-", "D_n": "R", "S'": "h'", "S''": "h''"}
     return {names.get(name, name): value for name, value in own.items()}
 
@@ -85,22 +61,6 @@ keep: J, \alpha, \beta, \mathsf M, S, x, m
 """
 
 
-second_order = r"""
-\lambda, \Psi, D_n: in .2 .9
-S', S'', y: num
-S = 0.3
-x: nodes \lambda \Psi
-s(x) = S+S'(x-\lambda)+S''(x-\lambda)^2/2
-h = \mathsf Ms(x)
-G = \mathsf M(x-\lambda)s(x)/\Psi
-F = \mathsf M(s(x)-h)^2+D_n
-K = \Psi G/F
-z = \lambda+K(y-h)
-p = \Psi-K^2F
-keep: h, G, F, K, z, p, \lambda, \Psi, y, S, S', S'', D_n
-"""
-
-
 statistical = r"""
 \lambda, \Psi, D_n: in .2 .9
 y: num
@@ -118,7 +78,7 @@ S'(x) = \cos x
 """
 
 
-LETTERS = (course, display, western, again, line, second_order, statistical)
+LETTERS = (display, western, again, line, statistical)
 SAID = {
     DEFINITION: [
         r"x_{k+1}=x_k-T\sin x_k+\cos(x_k)\,\xi_k",

@@ -1,9 +1,7 @@
 """The letters of wiener.md: spectra as sums over correlations, least squares for the
 amplitude."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.worlds import world
 
 signal = r"""
 a: in .5 .8
@@ -67,15 +65,7 @@ p' = p-Kps
 """
 
 
-def found(rng):
-    """The greatest ratio for one pulse: the mean of the correlator over its deviation, squared."""
-    own = world(amplitude)(rng)
-    return {name: own[name] for name in ("R", "E", "b")} | {
-        "d": own["b"] * own["E"] / np.sqrt(own["R"] * own["E"])
-    }
-
-
-LETTERS = (signal, amplitude, correlator, weights, one_sample, found)
+LETTERS = (signal, amplitude, correlator, weights, one_sample)
 SAID = {
     DEFINITION: [r"\zeta=e^{i\theta}", "x_{k+1}=ax_k+v_k", "y_k=x_k+w_k", r"y_k=b\,s_k+w_k"],
     "quoted from Van Trees": [

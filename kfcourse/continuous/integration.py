@@ -40,6 +40,7 @@ FEW = 64
 # between two measurements: of few trajectories, for which the implicit method is then faster; of
 # many, some seconds
 STEPS, MOST_STEPS = 2_000, 10_000
+SEEN = 100  # steps after which their length tells how many there will be
 NEAR = 1e-3  # of a mean that has no variance: a part of it stands for the standard deviation
 
 # (known, z, p) -> M[a], A, M[B B^T]
@@ -123,12 +124,14 @@ def at_rest(model: Model) -> Model:
     )
 
 
-def rates_of(model: Model, approximation: Callable[[Model], Structure]) -> Rates:
-    """The right sides as a function of arrays; of sigma points by the slopes of their
-    regression."""
+def rates_of(
+    model: Model, approximation: Callable[[Model], Structure], derived: MomentEquations | None
+) -> Rates:
+    """The right sides as a function of arrays; of sigma points, for which nothing is derived, by
+    the slopes of their regression."""
     n = model.n
-    if approximation in (gaussian, linearised):
-        z, p, *rates = moment_equations(model, approximation)
+    if derived is not None:
+        z, p, *rates = derived
         outputs = {
             name: part.subs(model.values)
             for name, part in zip(("drift", "A", "Q"), rates, strict=True)
@@ -279,14 +282,18 @@ def _run(
 ) -> Array | None:
     """The state after the span, by steps whose error stays below the accuracy; None if they are
     more than `most`."""
-    s, h, slopes = 0.0, span, np.empty((7, state.size))
+    s, h, earlier, slopes = 0.0, span, span, np.empty((7, state.size))
 
     def moved(weights: Array) -> Array:
         return h * (weights @ slopes[: len(weights)]).reshape(state.shape)
 
     with np.errstate(all="ignore"):  # a step that leaves the finite numbers is taken again, shorter
         slopes[0] = rate(s, state).ravel()
-        for _ in range(most):
+        for done in range(most):
+            if done == SEEN // 2:
+                earlier = h
+            if done == SEEN and span - s > 2 * most * h > most * earlier:
+                break  # stability, not what comes, holds the steps so short: they will not do
             for i in range(1, 6):
                 slopes[i] = rate(s + RK45.C[i] * h, state + moved(RK45.A[i, :i])).ravel()
             ahead = state + moved(RK45.B)

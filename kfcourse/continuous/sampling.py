@@ -22,7 +22,7 @@ import sympy as sp
 from kfcourse.angles import on_circle
 from kfcourse.continuous.equations import symmetrised_drift
 from kfcourse.continuous.exact import by_substeps
-from kfcourse.continuous.integration import at_rest, flow_of, rates_of
+from kfcourse.continuous.integration import at_rest, flow_of, moment_equations, rates_of
 from kfcourse.continuous.model import diffusion_rows, numbered
 from kfcourse.errors import expect_sizes
 from kfcourse.filters.base import Filter
@@ -44,6 +44,8 @@ from kfcourse.symbolic.known import Known
 from kfcourse.symbolic.model import OF_A_VARIANT, Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, Names, by_name, read
 from kfcourse.symbolic.structure import Structure, of_steps
+from kfcourse.symbolic.typesetting import joined
+from kfcourse.symbolic.writing import formula_latex
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,15 @@ class Between:
         """Structural functions: tau and Theta by the moment equations, h, G and F of the meter as
         of every model."""
         meter = approximation(at_rest(model))
-        flow, angles = flow_of(rates_of(model, approximation), model, self.accuracy), model.angles.x
+        formulas = derived = None
+        if meter.formulas is not None:
+            z, p, *rates = derived = moment_equations(model, approximation)
+            names = ("tau_dot", "A", "Theta_dot", "p_dot")
+            functions = dict(zip(names, [*rates, derived.rates[1]], strict=True))
+            functions |= {name: meter.formulas.functions[name] for name in "hGF"}
+            formulas = replace(meter.formulas, model=model, z=z, p=p, functions=functions)
+        compiled = rates_of(model, approximation, derived)
+        flow, angles = flow_of(compiled, model, self.accuracy), model.angles.x
 
         def at(k: int | None) -> Structure:
             k = k or 0
@@ -90,7 +100,24 @@ class Between:
 
             return Structure(meter.name, model, predict, meter.at(k).measure, transition)
 
-        return of_steps(meter.name, model, at)
+        return of_steps(meter.name, model, at, formulas)
+
+    def latex(self, x: Sequence[sp.Symbol]) -> list[str]:
+        """Lines dx = a dt + B dV of an `aligned` block, V the Wiener processes."""
+        lines = []
+        for i, name in enumerate(x):
+            factors = {"dt": self.drift[i]}
+            for j, entry in enumerate(self.diffusion.row(i), 1):
+                factors[f"dV_{{{j}}}" if self.diffusion.cols > 1 else "dV"] = entry
+            terms = []
+            for of, factor in factors.items():
+                text = formula_latex(factor, x)
+                text = rf"\left({text}\right)" if factor.is_Add else text
+                if factor != 0:
+                    terms.append({1: "", -1: "-"}.get(factor, text) + rf"\,{of}")
+            first, *further = joined(terms)
+            lines += [f"d{sp.latex(name)} &= {first}", *(rf"&\quad {line}" for line in further)]
+        return lines
 
     def exact(self, model: Model, accuracy: float) -> Filter:
         """`pointmass` of a scalar model, by sub-steps (`kfcourse.continuous.exact`)."""

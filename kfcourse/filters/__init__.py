@@ -16,14 +16,14 @@ particles               the same by sampling, with modes or without;  densities:
 iterated_ekf            the meter linearised again at the estimate
 gate, robustness        measurements that are not believed: refused, by any filter; weighted; a
                         noise of unknown size, learnt
-alphabeta               gains from a table, constant in the end
+alphabeta               gains of a formula, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
                         (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes)
 notation                symbols in which the equations are printed
 programs                the printed equations as rules: letter and value
 """
 
-from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma
+from kfcourse.filters.alphabeta import alpha_beta
 from kfcourse.filters.approximations import EQUATIONS as _AOF
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter, State
@@ -52,7 +52,6 @@ __all__ = [
     "State",
     "adaptive",
     "alpha_beta",
-    "alpha_beta_gamma",
     "aof",
     "dfkp",
     "dfmp",

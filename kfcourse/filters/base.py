@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -100,6 +100,9 @@ class Filter:
     look_back : LookBack, optional
         Where it is another than the normal law's by `structure`: what the whole record tells of
         each state.
+    mixture : callable, optional
+        Where what it expects of a measurement is a mixture of normal laws: the state before it to
+        their weights (runs, M), and the M expectations.
     """
 
     name: str
@@ -110,31 +113,32 @@ class Filter:
     structure: Structure | None = None
     evidence: Evidence | None = None
     look_back: LookBack | None = None
+    mixture: Callable[[State], tuple[Array, Sequence[Measurement]]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:
             object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
 
 
-def structure_of(one: Filter, what: str) -> Structure:
+def structure_of(filter_: Filter, what: str) -> Structure:
     """The structural functions of a filter; ValueError that tells what needs them if it has
     none."""
-    if one.structure is None:
+    if filter_.structure is None:
         raise ValueError(
             f"{what} needs the structural functions by which a filter expects and predicts, and "
-            f"{one.name} has none of its own: "
+            f"{filter_.name} has none of its own: "
             "take one whose laws are normal, such as aof(linearised(model)), "
             "aof(unscented(model)) or kalman_filter(model)"
         )
-    return one.structure
+    return filter_.structure
 
 
-def unknown_error(one: Filter) -> ValueError:
+def unknown_error(filter_: Filter) -> ValueError:
     """What is raised where a filter is asked how far its laws are from the true ones, and cannot
     tell."""
     return ValueError(
-        f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, "
-        f"or particle(model)"
+        f"{filter_.name} does not know how good its laws are: ask pointmass(model), which is "
+        "exact, or particle(model)"
     )
 
 

@@ -19,6 +19,7 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference
 from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -163,12 +164,7 @@ def _law(
     """Mean and covariance of what an equation gives, as formulas; ModelError if they are not those
     of a density."""
     B = equation.jacobian(sp.Matrix(noise))
-    decided = any(
-        condition.has(*noise)
-        for choice in equation.atoms(sp.Piecewise)
-        for _, condition in choice.args
-    )
-    if B.has(*noise) or decided:
+    if B.has(*noise) or decides(equation, noise):
         raise _no_density(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple density; "
             f"{REMEDY}"

@@ -64,7 +64,7 @@ class Gate(NamedTuple):
 
 
 def gated(
-    one: Filter,
+    filter_: Filter,
     probability: float = 0.999,
     patience: int | None = 5,
     structure: Structure | None = None,
@@ -74,7 +74,7 @@ def gated(
 
     Parameters
     ----------
-    one : Filter
+    filter_ : Filter
         Any filter: what is refused reaches it as missing (NaN).
     probability : float
         With which the gate lets a measurement pass if the filter is right.
@@ -114,7 +114,7 @@ def gated(
     >>> [round(run(each, y).mean[-1].item(), 3) for each in (one, gated(one))]
     [23.247, 0.033]
     """
-    expect(one, Filter, "gated")
+    expect(filter_, Filter, "gated")
     if structure is not None:
         expect(structure, Structure, "structure=")
     if not 0 < probability < 1:
@@ -126,10 +126,10 @@ def gated(
             f"patience must be a whole number of refusals, at least 1, or None for no end of it; "
             f"got {patience!r}"
         )
-    expecting = structure or structure_of(one, "a gate")
+    expecting = structure or structure_of(filter_, "a gate")
     # For 0, ..., p components measured; with none there is nothing to refuse.
     limits = np.array(
-        [np.inf, *scipy.special.chdtri(np.arange(1, one.model.p + 1), 1 - probability)]
+        [np.inf, *scipy.special.chdtri(np.arange(1, filter_.model.p + 1), 1 - probability)]
     )
 
     def judged(state: State, y: Array) -> tuple[Measurement, Array, Array, Array]:
@@ -145,15 +145,15 @@ def gated(
         return expected, size, limit, (size > limit) & ~np.asarray(lost)[..., None]
 
     def init(runs: int) -> State:
-        state = one.init(runs)
-        nothing = np.zeros((runs, one.model.p), dtype=bool)
+        state = filter_.init(runs)
+        nothing = np.zeros((runs, filter_.model.p), dtype=bool)
         return state._replace(
             memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), nothing, state.memory)
         )
 
     def step(state: State, y: Array) -> State:
         expected, _, _, beyond = judged(state, y)
-        after = one.step(state._replace(memory=state.memory.inner), np.where(beyond, np.nan, y))
+        after = filter_.step(state._replace(memory=state.memory.inner), np.where(beyond, np.nan, y))
         measured = ~np.isnan(y)
         passed, missing = measured & ~beyond, ~measured.any(axis=-1)
         weight = np.where(
@@ -182,7 +182,12 @@ def gated(
 
     # a way of its own to look back needs its own memories, not those of the gate
     return replace(
-        one, name=f"gated-{one.name}", init=init, step=step, evidence=evidence, look_back=None
+        filter_,
+        name=f"gated-{filter_.name}",
+        init=init,
+        step=step,
+        evidence=evidence,
+        look_back=None,
     )
 
 

@@ -49,11 +49,12 @@ def correction(j: object, size: int) -> tuple[sp.Eq, ...]:
     G, F = s.matrix(of("G", j), s.p, s.n), s.matrix(of("F", j), s.p, s.p)
     at = rf"({lam.name}, {Psi.name})"
     values = [
-        s.matrix(rf"{name}^{{{j}}}{at}", *one.shape) for name, one in (("h", h), ("G", G), ("F", F))
+        s.matrix(rf"{name}^{{{j}}}{at}", *entry.shape)
+        for name, entry in (("h", h), ("G", G), ("F", F))
     ]
     total = sp.Add(*(number("c", i) * likelihood(i) for i in range(1, size + 1)), evaluate=False)
     return (
-        *(s.equation(one, value) for one, value in zip((h, G, F), values, strict=True)),
+        *(s.equation(entry, value) for entry, value in zip((h, G, F), values, strict=True)),
         s.equation(K, Psi * G.T * F.I),
         s.equation(z, lam + K * (s.y - h)),
         s.equation(p, Psi - K * G * Psi),
@@ -68,7 +69,7 @@ def combination(j: object, size: int) -> tuple[sp.Eq, ...]:
         [make(name, i) for i in modes]
         for make, name in ((number, r"\mu"), (vector, "z"), (square, "p"), (vector, r"\delta"))
     )
-    spread = [one + away * away.T for one, away in zip(p, delta, strict=True)]
+    spread = [entry + away * away.T for entry, away in zip(p, delta, strict=True)]
     return (
         s.equation(s.z, _sum(mu, z)),
         s.equation(vector(r"\delta", j), vector("z", j) - s.z),
@@ -85,18 +86,21 @@ def prediction(j: object, size: int) -> tuple[sp.Eq, ...]:
     lam, Psi = vector(r"\lambda", j, "k+1"), square(r"\Psi", j, "k+1")
     laws, away = [ahead(j, i) for i in modes], [vector(r"\delta", f"{i}{j}", "k+1") for i in modes]
     return (
-        s.equation(c, sp.Add(*(one * weight for one, weight in zip(pi, mu, strict=True)))),
+        s.equation(c, sp.Add(*(entry * weight for entry, weight in zip(pi, mu, strict=True)))),
         *(
-            s.equation(share, one * weight / c)
-            for share, one, weight in zip(w, pi, mu, strict=True)
+            s.equation(share, entry * weight / c)
+            for share, entry, weight in zip(w, pi, mu, strict=True)
         ),
         s.equation(lam, _sum(w, [tau for tau, _ in laws])),
-        *(s.equation(one, tau - lam) for one, (tau, _) in zip(away, laws, strict=True)),
+        *(s.equation(entry, tau - lam) for entry, (tau, _) in zip(away, laws, strict=True)),
         s.equation(
-            Psi, _sum(w, [Theta + one * one.T for one, (_, Theta) in zip(away, laws, strict=True)])
+            Psi,
+            _sum(
+                w, [Theta + entry * entry.T for entry, (_, Theta) in zip(away, laws, strict=True)]
+            ),
         ),
     )
 
 
 def _sum(weights: list[sp.Symbol], parts: list[sp.MatrixExpr]) -> sp.MatrixExpr:
-    return sp.MatAdd(*(sp.MatMul(w, one) for w, one in zip(weights, parts, strict=True)))
+    return sp.MatAdd(*(sp.MatMul(w, entry) for w, entry in zip(weights, parts, strict=True)))

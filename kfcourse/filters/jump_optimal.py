@@ -31,7 +31,13 @@ import numpy as np
 from kfcourse.errors import expect
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
-from kfcourse.filters.multiple_models import mixture, modes_given, onward
+from kfcourse.filters.multiple_models import (
+    corrected,
+    expectations,
+    mixture,
+    modes_given,
+    onward,
+)
 from kfcourse.filters.optimal_structure import (
     STEPS,
     Memory,
@@ -39,7 +45,7 @@ from kfcourse.filters.optimal_structure import (
     checked_memory,
     expected_where_missing,
 )
-from kfcourse.laws import Array, Gaussian, Measurement, correct
+from kfcourse.laws import Array, Gaussian, Measurement
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, expect_each
@@ -102,8 +108,8 @@ def _remembering(
     modes."""
     what = f"the logic-dynamic {name.upper()}"
     expect(model, JumpModel, what)
-    expect_each(structures, what)
     model.without_state(what)
+    expect_each(structures, what)
     if model.angles.x or model.angles.y:
         raise ModelError(f"{what} takes no components that are angles")
 
@@ -117,16 +123,10 @@ def _remembering(
     def equations(state: State, y: Array) -> Equations:
         k, before = state.step, state.memory
         now = [structure.at(k) for structure in structures]
-        expectations = [
-            one.measure(*prior) for one, prior in zip(now, before.predicted, strict=True)
-        ]
-        corrected = [
-            correct(prior, one, y)
-            for prior, one in zip(before.predicted, expectations, strict=True)
-        ]
-        mu, _ = modes_given(before.expected, expectations, y)
-        posterior = mixture(corrected, mu)
-        seen = _seen(y, before.expected, expectations) if memory.measurements else y
+        measured = expectations(now, before)
+        of_modes, mu = corrected(before, measured, y)
+        posterior = mixture(of_modes, mu)
+        seen = _seen(y, before.expected, measured) if memory.measurements else y
         kept = before.kept.and_now(posterior.mean, seen, memory, ())
         zeta = kept.regressor
         constant, unit = np.zeros((len(y), 1)), np.eye(zeta.shape[1])
@@ -163,5 +163,5 @@ def _remembering(
 
 def _seen(y: Array, expected: Array, expectations: Sequence[Measurement]) -> Array:
     """The measurement; where it is missing what all modes together expect of it."""
-    h = sum(expected[:, j, None] * one.h for j, one in enumerate(expectations))
+    h = sum(expected[:, j, None] * measurement.h for j, measurement in enumerate(expectations))
     return expected_where_missing(y, expectations[0]._replace(h=np.asarray(h)), ())

@@ -24,7 +24,7 @@ ROUNDING = 1e-8
 
 
 def looked_back(
-    one: Filter, states: Iterable[State], y: Array, lag: int | None = None
+    filter_: Filter, states: Iterable[State], y: Array, lag: int | None = None
 ) -> list[State]:
     """States whose laws are those given the whole record y (steps, runs, p), from the filter's
     after each measurement.
@@ -32,9 +32,9 @@ def looked_back(
     With a lag, given so many later measurements: a way of a filter's own then looks back as often
     as there are steps. ValueError for a filter that has no way to look back, or a lag that is none.
     """
-    if one.look_back is None:
+    if filter_.look_back is None:
         structure, back, laws = (
-            structure_of(one, "looking back"),
+            structure_of(filter_, "looking back"),
             list[Backward](),
             list[Gaussian](),
         )
@@ -45,10 +45,10 @@ def looked_back(
             before = state
         return [
             State(k, law, law)
-            for k, law in enumerate(look_back(back, laws, lag, one.model.angles.x), start=1)
+            for k, law in enumerate(look_back(back, laws, lag, filter_.model.angles.x), start=1)
         ]
     check_lag(lag)
-    back_to, reach = one.look_back(states, y), len(y) if lag is None else min(lag + 1, len(y))
+    back_to, reach = filter_.look_back(states, y), len(y) if lag is None else min(lag + 1, len(y))
     early = [deque(islice(back_to(end), reach), maxlen=1)[0] for end in range(reach, len(y))]
     return [*early, *reversed([*islice(back_to(len(y)), reach)])]
 

@@ -43,8 +43,8 @@ pi_ij deceives by some per cent; the other components follow by regression on th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from typing import NamedTuple, TypeAlias
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import logsumexp
@@ -96,10 +96,7 @@ class Modes(NamedTuple):
 
 
 def imm(
-    structures: Sequence[Structure],
-    transition: Chain,
-    probabilities: Array | None = None,
-    name: str = "imm",
+    structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None
 ) -> Filter:
     """The IMM filter with one structure a mode.
 
@@ -112,8 +109,6 @@ def imm(
         may depend on the state.
     probabilities : ndarray (M,), optional
         Of the modes before the first measurement; by default those of the JumpModel, else equal.
-    name : str
-        Name of the filter.
 
     Returns
     -------
@@ -136,14 +131,11 @@ def imm(
     ) -> Gaussian:
         return predict(*mixture(laws, weights, angles))
 
-    return _one_law_a_mode(name, structures, transition, probabilities, following)
+    return _one_law_a_mode("imm", structures, transition, probabilities, following)
 
 
 def logic_dynamic(
-    structures: Sequence[Structure],
-    transition: Chain,
-    probabilities: Array | None = None,
-    name: str | None = None,
+    structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None
 ) -> Filter:
     """The logic-dynamic AOF: as `imm`, but predictions are merged, not the laws before them.
 
@@ -152,14 +144,14 @@ def logic_dynamic(
 
     Arguments, result and errors as of `imm`.
     """
-    expect_each(structures, "logic_dynamic")
 
     def following(
         predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components
     ) -> Gaussian:
         return mixture([predict(*law) for law in laws], weights, angles)
 
-    name = name or "aof-jump-" + "".join(structure.name for structure in structures[:1])
+    expect_each(structures, "logic_dynamic")
+    name = f"aof-jump-{structures[0].name}"
     return _one_law_a_mode(name, structures, transition, probabilities, following)
 
 
@@ -183,24 +175,21 @@ def _one_law_a_mode(
 
     def step(state: State, y: Array) -> State:
         memory, now = state.memory, [structure.at(state.step) for structure in structures]
-        corrected, mu, _ = _corrected(now, memory, y)
-        pi, leading = links(state.step, corrected)
+        laws, mu = corrected(memory, expectations(now, memory), y)
+        pi, leading = links(state.step, laws)
         expected, weights = onward(mu, pi)
         predicted = tuple(
             following(structure.predict, [row[j] for row in leading], weights[:, :, j], angles)
             for j, structure in enumerate(now)
         )
-        law, ahead = mixture(corrected, mu, angles), mixture(predicted, expected, angles)
+        law, ahead = mixture(laws, mu, angles), mixture(predicted, expected, angles)
         return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
 
-    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
+    return _with_evidence(Filter(name, model, init, step), structures)
 
 
 def gpb2(
-    structures: Sequence[Structure],
-    transition: Chain,
-    probabilities: Array | None = None,
-    name: str = "gpb2",
+    structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None
 ) -> Filter:
     """The generalised pseudo-Bayes filter of order 2: pairs of modes (i_{k-1}, i_k) are corrected
     each, and merged afterwards.
@@ -212,7 +201,7 @@ def gpb2(
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs,
     i first.
     """
-    links, first, model = _checked(name, structures, transition, probabilities)
+    links, first, model = _checked("gpb2", structures, transition, probabilities)
     angles, size = model.angles.x, len(structures)
 
     def init(runs: int) -> State:
@@ -225,10 +214,10 @@ def gpb2(
 
     def step(state: State, y: Array) -> State:
         memory, now = state.memory, [structure.at(state.step) for structure in structures]
-        corrected, pairs, _ = _corrected(now, memory, y)
+        of_pairs, pairs = corrected(memory, expectations(now, memory), y)
         pairs = pairs.reshape(len(y), size, size)
         mu, weights = pairs.sum(axis=1), _shares(pairs)
-        laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
+        laws = [mixture(of_pairs[j::size], weights[:, :, j], angles) for j in range(size)]
         law = mixture(laws, mu, angles)
         laws = [_where(mu[:, j] > 0, of_mode, law) for j, of_mode in enumerate(laws)]
         pi, leading = links(state.step, laws)
@@ -245,36 +234,38 @@ def gpb2(
             Modes(mu, expected, predicted),
         )
 
-    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
+    return _with_evidence(Filter("gpb2", model, init, step), structures)
 
 
-def _expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
+def expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
     """What is expected to be measured in each mode, or for each pair of modes in the second of
     them."""
     return [now[i % len(now)].measure(*law) for i, law in enumerate(memory.predicted)]
 
 
-def _corrected(
-    now: Sequence[Structure], memory: Modes, y: Array
-) -> tuple[list[Gaussian], Array, Array]:
-    """The laws corrected with y, their probabilities (runs, ...), and ln p(y)."""
-    expectations = _expectations(now, memory)
-    laws = [
-        correct(law, expected, y)
-        for law, expected in zip(memory.predicted, expectations, strict=True)
-    ]
-    return laws, *modes_given(memory.expected, expectations, y)
+def corrected(
+    memory: Modes, expected: Sequence[Measurement], y: Array
+) -> tuple[list[Gaussian], Array]:
+    """The laws corrected with y, and their probabilities (runs, ...)."""
+    laws = [correct(*pair, y) for pair in zip(memory.predicted, expected, strict=True)]
+    return laws, modes_given(memory.expected, expected, y)[0]
 
 
-def _evidence(structures: Sequence[Structure], before: State, y: Array, after: State) -> Array:
-    now = [structure.at(before.step) for structure in structures]
-    return modes_given(before.memory.expected, _expectations(now, before.memory), y)[1]
+def _with_evidence(filter_: Filter, structures: Sequence[Structure]) -> Filter:
+    """The filter with what it expects of measurements, a mixture."""
+
+    def expected(before: State) -> tuple[Array, list[Measurement]]:
+        now = [structure.at(before.step) for structure in structures]
+        return before.memory.expected, expectations(now, before.memory)
+
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return modes_given(*expected(before), y)[1]
+
+    return replace(filter_, evidence=evidence, mixture=expected)
 
 
 def _where(holds: Array, law: Gaussian, other: Gaussian) -> Gaussian:
     """For each trajectory one of two laws."""
-    if holds.all():
-        return law
     return Gaussian(
         np.where(holds[:, None], law.mean, other.mean),
         np.where(holds[:, None, None], law.cov, other.cov),
@@ -286,10 +277,8 @@ def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
     M, M)."""
     joint = mu[:, :, None] * pi
     expected = joint.sum(axis=1)
-    if not np.minimum.reduce(expected, axis=None) > 0:
-        # a mode that cannot come next starts from the combined law; nothing uses it
-        joint = np.where(expected[:, None, :] > 0, joint, mu[:, :, None])
-    return expected, _shares(joint)
+    # a mode that cannot come next starts from the combined law; nothing uses it
+    return expected, _shares(np.where(expected[:, None, :] > 0, joint, mu[:, :, None]))
 
 
 def _shares(joint: Array) -> Array:
@@ -304,24 +293,17 @@ def _checked(
     """The links, the first probabilities (M,), and the first model; errors if the parts do not
     fit."""
     expect_each(structures, name)
-    size = len(structures)
-    if not size:
-        raise ValueError("give at least one structure, such as linearised(model)")
-    first = structures[0].model
-    for structure in structures[1:]:
-        model = structure.model
-        for what, mine, its in (
-            ("state", [s.name for s in first.x], [s.name for s in model.x]),
-            ("number of measured components", first.p, model.p),
-            ("components that are angles", first.angles, model.angles),
-            (
-                "prior",
-                [part.tolist() for part in first.prior],
-                [part.tolist() for part in model.prior],
-            ),
-        ):
-            if mine != its:
-                raise ValueError(f"all modes need the same {what}: {mine} and {its} differ")
+    size, first = len(structures), structures[0].model
+
+    def form(model: Model) -> tuple[Any, ...]:
+        return model.x, model.p, model.angles, [part.tolist() for part in model.prior]
+
+    for structure in structures:
+        if form(structure.model) != form(first):
+            raise ValueError(
+                f"all modes need the same state, measured components, angles and prior: {first} "
+                f"and {structure.model} differ"
+            )
     jumping = transition if isinstance(transition, JumpModel) else None
     if probabilities is None:
         probabilities = np.full(size, 1.0 / size) if jumping is None else jumping.first

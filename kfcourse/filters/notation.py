@@ -12,6 +12,8 @@ from functools import cache
 import sympy as sp
 from sympy.printing.latex import LatexPrinter
 
+from kfcourse.symbolic.typesetting import aligned
+
 n, p, r = sp.symbols("n p r", positive=True, integer=True)
 
 
@@ -112,4 +114,4 @@ def latex(equations: Sequence[sp.Eq], columns: int = 1) -> str:
     printer = _Printer()
     each = [rf"{printer.doprint(q.lhs)} &= {printer.doprint(q.rhs)}" for q in equations]
     rows = [r" &\qquad ".join(each[i : i + columns]) for i in range(0, len(each), columns)]
-    return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+    return aligned(rows)

@@ -94,7 +94,7 @@ class Remembered(NamedTuple):
     def and_now(self, z: Array, y: Array, memory: Memory, turning: Components) -> Remembered:
         """With the newest; the oldest drop out.  Older angles are kept within half a turn of the
         newest."""
-        older = (near(one, z, turning) for one in self.estimates)
+        older = (near(estimate, z, turning) for estimate in self.estimates)
         return Remembered(
             (z, *older)[: memory.estimates], (y, *self.measurements)[: memory.measurements]
         )

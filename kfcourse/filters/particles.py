@@ -37,7 +37,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaln
@@ -115,11 +115,6 @@ class Clouds:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
         return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=-1))
 
-    def evidence_error(self) -> Array:
-        """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of
-        both clouds."""
-        return 0.5 * np.abs(self.evidence[0] - self.evidence[1])
-
 
 def particle(
     model: Model | JumpModel,
@@ -134,8 +129,7 @@ def particle(
     Parameters
     ----------
     model : Model or JumpModel
-        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly, or can be
-        solved for.
+        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly.
     particles : int
         Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells
         how many count.
@@ -164,50 +158,74 @@ def particle(
             f"a particle filter needs an even number of at least 2 particles, got {particles!r}"
         )
     jumping = model if isinstance(model, JumpModel) else None
-    modes = [Mode.of(each) for each in (model.modes if isinstance(model, JumpModel) else (model,))]
-    first, size = np.ones(1) if jumping is None else jumping.first, particles // 2
-    prior, angles = modes[0].model.prior, modes[0].model.angles.x
-    gaussian_init = initial_state(modes[0].model)
-    root = square_root(prior.cov)
+    modes = model.modes if isinstance(model, JumpModel) else (model,)
+    sampler = Sampler([*map(Mode.of, modes)], jumping, particles // 2, seed, guided)
+    back = sampler.look_back if jumping is None else None
+    return Filter(
+        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, look_back=back
+    )
 
-    def init(runs: int) -> State:
-        state = gaussian_init(runs)
-        halves, probability = np.stack([state.posterior.mean] * 2), np.tile(first, (runs, 1))
-        count, evidence = np.full(runs, float(particles)), np.zeros((2, runs))
+
+@dataclass(frozen=True)
+class Sampler:
+    """The steps of a particle filter: what it draws, weighs, resamples."""
+
+    modes: Sequence[Mode]
+    jumping: JumpModel | None
+    size: int  # of each cloud
+    seed: int
+    guided: bool
+
+    @property
+    def angles(self) -> Components:
+        return self.modes[0].model.angles.x
+
+    @property
+    def first(self) -> Array:
+        """Probabilities of the modes before anything is measured, (J,)."""
+        return np.ones(1) if self.jumping is None else self.jumping.first
+
+    def init(self, runs: int) -> State:
+        state = initial_state(self.modes[0].model)(runs)
+        halves = np.stack([state.posterior.mean] * 2)
+        count, evidence = np.full(runs, 2.0 * self.size), np.zeros((2, runs))
+        probability = np.tile(self.first, (runs, 1))
         return state._replace(memory=Clouds(halves, count, evidence, None, None, probability))
 
-    def chances(x: Array, mode: Array, k: int) -> Array:
+    def chances(self, x: Array, mode: Array, k: int) -> Array:
         """Probabilities of the mode after step k, (runs, 2, M/2, J)."""
-        if jumping is None:
+        if self.jumping is None:
             return np.ones((*mode.shape, 1))
-        return np.take_along_axis(jumping.transition_of(x, k), mode[..., None, None], axis=-2)[
-            ..., 0, :
+        pi = self.jumping.transition_of(x, k)
+        return np.take_along_axis(pi, mode[..., None, None], axis=-2)[..., 0, :]
+
+    def ways(self, before: Clouds, shape: tuple[int, ...], k: int) -> tuple[Array, list[Any]]:
+        """Probabilities of the modes at step k, and of each how normal noises s make x_k and where
+        the search for s begins."""
+        if before.x is None or before.mode is None:
+            prior = self.modes[0].model.prior
+            root, n = square_root(prior.cov), len(prior.mean)
+            start = np.tile(STARTS[:, None] / np.sqrt(n), (shape[0], 1, 1, 1, n))
+            draw = (lambda s: on_circle(prior.mean + s @ root.T, self.angles)), start
+            return np.broadcast_to(self.first, (*shape, len(self.modes))), [draw] * len(self.modes)
+        return self.chances(before.x, before.mode, k - 1), [
+            (partial(mode.moved, before.x, k=k - 1), np.zeros((*shape, 1, mode.noises)))
+            for mode in self.modes
         ]
 
     def drawn(
-        rng: np.random.Generator, before: Clouds, y: Array, k: int
+        self, rng: np.random.Generator, before: Clouds, y: Array, k: int
     ) -> tuple[Array, Array, Array]:
         """x_k (runs, 2, M/2, n), its modes, and ln of p over the density with which both were
         drawn."""
-        shape = (len(y), 2, size)
-        if before.x is None or before.mode is None:
-            pi, n = np.broadcast_to(first, (*shape, len(modes))), len(prior.mean)
-            at = np.tile(STARTS[:, None] / np.sqrt(n), (len(y), 1, 1, 1, n))
-            moves = [lambda s: on_circle(prior.mean + s @ root.T, angles)] * len(modes)
-            starts = [at] * len(modes)
-        else:
-            pi = chances(before.x, before.mode, k - 1)
-            moves = [partial(mode.moved, before.x, k=k - 1) for mode in modes]
-            starts = [np.zeros((*shape, 1, mode.noises)) for mode in modes]
+        shape = (len(y), 2, self.size)
+        pi, ways = self.ways(before, shape, k)
         states, logs, heights = [], [], []
-        for way, moved, at in zip(modes, moves, starts, strict=True):
-            s, log, height = (
-                rng.standard_normal((*shape, at.shape[-1])),
-                np.zeros(shape),
-                np.zeros(shape),
-            )
-            if guided:
-                law, tells, height = way.look(moved, at, y[:, None, None, None], k)
+        for mode, (moved, start) in zip(self.modes, ways, strict=True):
+            s = rng.standard_normal((*shape, start.shape[-1]))
+            log, height = np.zeros(shape), np.zeros(shape)
+            if self.guided:
+                law, tells, height = mode.look(moved, start, y[:, None, None, None], k)
                 wide, log_of_wide = _wide(rng, law, shape)
                 s, log = np.where(tells[..., None], wide, s), np.where(tells, log_of_wide, log)
             states.append(moved(s))
@@ -215,75 +233,60 @@ def particle(
             heights.append(np.broadcast_to(height, shape))
         seen, _ = _normalised(np.log(pi) + np.stack(heights, axis=-1))
         share = (1 - PRIOR) * seen + PRIOR * pi
-        mode = _chosen(rng, share)
-        lifted = np.take_along_axis(np.log(pi) - np.log(share), mode[..., None], axis=-1)[..., 0]
-        return np.choose(mode[..., None], states), mode, lifted + np.choose(mode, logs)
+        modes = _chosen(rng, share)
+        lifted = np.take_along_axis(np.log(pi) - np.log(share), modes[..., None], axis=-1)[..., 0]
+        return np.choose(modes[..., None], states), modes, lifted + np.choose(modes, logs)
 
-    def step(state: State, y: Array) -> State:
-        k, rng = state.step, state.memory.generator(seed, len(y), state.step)
+    def step(self, state: State, y: Array) -> State:
+        k, memory = state.step, state.memory
+        rng = memory.generator(self.seed, len(y), k)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            x, mode, logs = drawn(rng, state.memory, y, k)
+            x, mode, logs = self.drawn(rng, memory, y, k)
             lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))
-            x = np.where(lost[..., None], np.clip(np.nan_to_num(x), -LARGEST, LARGEST), x)
-            logs = logs + np.choose(
-                mode, [each.log_likelihood(y[:, None, None], x, k) for each in modes]
-            )
-            weights, log_mean = _normalised(np.where(lost, -np.inf, logs))
-            mean, cov = weighted(x, weights, angles)
-            probability = [
-                (weights * (mode == j)).sum(axis=-1).mean(axis=1) for j in range(len(modes))
-            ]
+            x = np.clip(np.nan_to_num(x), -LARGEST, LARGEST)
+            likelihoods = [each.log_likelihood(y[:, None, None], x, k) for each in self.modes]
+            logs = np.where(lost, -np.inf, logs + np.choose(mode, likelihoods))
+            weights, log_mean = _normalised(logs)
+            law = weighted(x, weights, self.angles)
+            counts = [(weights * (mode == j)).sum(-1).mean(1) for j in range(len(self.modes))]
             kept = _systematic(rng, weights)
-            x, mode = (
-                np.take_along_axis(x, kept[..., None], axis=2),
-                np.take_along_axis(mode, kept, axis=2),
-            )
-            moves = [
-                each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in modes
-            ]
-            ahead = np.choose(_chosen(rng, chances(x, mode, k))[..., None], moves)
-            predicted = _of_both(*weighted(ahead, np.full(mode.shape, 1 / size), angles), angles)
-        effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
-        halves = np.moveaxis(mean, 1, 0)
+            x = np.take_along_axis(x, kept[..., None], axis=2)
+            mode = np.take_along_axis(mode, kept, axis=2)
+            predicted = self.ahead(rng, x, mode, k)
         memory = Clouds(
-            halves,
-            effective,
-            log_mean.T,
-            x,
-            mode,
-            np.stack(probability, axis=-1),
-            state.memory.part,
-        )
-        return State(k + 1, _of_both(mean, cov, angles), predicted, memory)
+            np.moveaxis(law.mean, 1, 0), _effective(weights), log_mean.T, x, mode,
+            np.stack(counts, axis=-1), memory.part,
+        )  # fmt: skip
+        return State(k + 1, _of_both(*law, self.angles), predicted, memory)
 
-    def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        memories, law = [state.memory for state in states], transition(modes[0].model)
+    def ahead(self, rng: np.random.Generator, x: Array, mode: Array, k: int) -> Gaussian:
+        """The law of the next state, from particles that move."""
+        moves = [
+            each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in self.modes
+        ]
+        moved = np.choose(_chosen(rng, self.chances(x, mode, k))[..., None], moves)
+        equal = np.full(mode.shape, 1 / self.size)
+        return _of_both(*weighted(moved, equal, self.angles), self.angles)
+
+    def look_back(self, states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
+        memories, law = [state.memory for state in states], transition(self.modes[0].model)
 
         def back(end: int) -> Iterator[State]:
-            rng = memories[0].generator(seed, end)
-            for step, (clouds, weights) in zip(
-                range(end, 0, -1),
-                _backwards(rng, [memory.x for memory in memories[:end]], law, angles),
-                strict=True,
-            ):
-                both, effective = (
-                    _of_both(*clouds, angles),
-                    (1 / (weights**2).sum(axis=-1)).sum(axis=1),
-                )
-                halves = np.moveaxis(clouds.mean, 1, 0)
-                yield State(
-                    step,
-                    both,
-                    both,
-                    replace(memories[step - 1], x=None, halves=halves, effective=effective),
-                )
+            rng = memories[0].generator(self.seed, end)
+            clouds = [memory.x for memory in memories[:end]]
+            backwards = _backwards(rng, clouds, law, self.angles)
+            for step, (of_clouds, weights) in zip(range(end, 0, -1), backwards, strict=True):
+                both, halves = _of_both(*of_clouds, self.angles), np.moveaxis(of_clouds.mean, 1, 0)
+                effective = _effective(weights)
+                memory = replace(memories[step - 1], x=None, halves=halves, effective=effective)
+                yield State(step, both, both, memory)
 
         return back
 
-    way_back = look_back if jumping is None else None
-    return Filter(
-        name, modes[0].model, init, step, slow=True, evidence=_evidence, look_back=way_back
-    )
+
+def _effective(weights: Array) -> Array:
+    """How many particles of both clouds count, (runs,)."""
+    return (1 / (weights**2).sum(axis=-1)).sum(axis=1)
 
 
 class Mode(NamedTuple):

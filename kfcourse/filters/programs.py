@@ -42,14 +42,14 @@ def scalar(
     if isinstance(expression, sp.Inverse):
         return inverse(scalar(expression.arg, inverse))
     if isinstance(expression, sp.MatMul | sp.MatAdd):
-        parts = [scalar(one, inverse) for one in expression.args]
+        parts = [scalar(part, inverse) for part in expression.args]
         return sp.Mul(*parts) if isinstance(expression, sp.MatMul) else sp.Add(*parts)
     return expression
 
 
 _ARRAYS = {
-    scalar(one): name
-    for one, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))
+    scalar(part): name
+    for part, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))
 }
 
 
@@ -72,6 +72,8 @@ def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
         )
     values = {}
     for value, (function, mean, cov) in _VALUES.items():
+        if function not in formulas.functions:
+            continue  # tau and Theta of what moves in continuous time are integrated
         arguments = formulas.meter_arguments if function in "hGF" else formulas.state_arguments
         taken = dict(zip(arguments, (scalar(mean), scalar(cov)), strict=True))
         values[scalar(value)] = structure[function].subs(taken, simultaneous=True)
@@ -93,7 +95,7 @@ def in_numbers(
     ):
         taken = {state[0]: scalar(at)} | dict(zip(noises, exact_matrix(law.mean), strict=True))
         values[scalar(value)] = equation[0].subs(taken, simultaneous=True)
-    return [(scalar(one.lhs), scalar(one.rhs, inverse).xreplace(values)) for one in equations]
+    return [(scalar(part.lhs), scalar(part.rhs, inverse).xreplace(values)) for part in equations]
 
 
 def needed(rules: Sequence[Rule], wanted: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:

@@ -210,8 +210,8 @@ def adaptive(structure: Structure, window: float = 50.0) -> Filter:
         expected = now.measure(*state.predicted)
         posterior = correct(state.predicted, trusted(expected, 1 / scale), y)
         present = (~np.isnan(y)).sum(axis=-1)
-        told = residual_square(expected, state.predicted, posterior, y) / np.maximum(present, 1)
-        learnt = np.where(present > 0, scale + (told - scale) / window, scale)
+        square = residual_square(expected, state.predicted, posterior, y) / np.maximum(present, 1)
+        learnt = np.where(present > 0, scale + (square - scale) / window, scale)
         return State(state.step + 1, posterior, now.predict(*posterior), Learnt(learnt))
 
     def evidence(before: State, y: Array, after: State) -> Array:

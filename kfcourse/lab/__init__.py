@@ -10,9 +10,9 @@ quality      is a variant well posed?  grammar: new ones, from the pieces of gra
 maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes, its JSON too, in English or Russian (report.toml);
-             report_sections, the comparison and the conclusion; report_plain, report_modes: task,
-             functions and filters of models without and with modes; report_text: numbers and
-             sentences; written_out: the AOF's equations with the model's functions in them
+             report_sections: from the task to the conclusion; report_modes: what is otherwise
+             of models with modes; report_text: numbers, sentences, the AOF's equations with
+             the model's functions in them
 own_data     what `kfcourse estimate` writes of a record from a file
 """
 

@@ -10,30 +10,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from kfcourse.lab.short_names import LAB, lab_filters
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.symbolic.model import Model
-
-
-@dataclass(frozen=True)
-class ParameterMap:
-    """Comparisons over two parameters: `cells[first, second]` is the one at these values.
-
-    Attributes
-    ----------
-    parameters : tuple of str
-        The first is drawn upwards, the second to the right.
-    cells : dict from (float, float) to Comparison
-    """
-
-    parameters: tuple[str, str]
-    cells: Mapping[tuple[float, float], Comparison]
-
-    def __getitem__(self, values: tuple[float, float]) -> Comparison:
-        return self.cells[values]
 
 
 def parameter_map(
@@ -43,8 +24,9 @@ def parameter_map(
     runs: int = 10_000,
     steps: int = 3,
     design_runs: int = 20_000,
-) -> ParameterMap:
-    """Compare the lab's filters with the exact AOF at every pair of values of two parameters.
+) -> dict[tuple[float, float], Comparison]:
+    """The comparison of the lab's filters with the exact AOF at every pair of values of two
+    parameters, `cells[first, second]`.
 
     Parameters
     ----------
@@ -53,17 +35,7 @@ def parameter_map(
         Two parameters, and the values of each.
     runs, steps, design_runs
         As of `kfcourse.compare`.
-
-    Raises
-    ------
-    ValueError
-        Not two parameters, or one that the model lacks.
     """
-    if len(values) != 2 or not set(values) <= set(model.parameters):
-        raise ValueError(
-            f"a map needs values of two of the parameters {', '.join(model.parameters)}, got "
-            f"{', '.join(values)}"
-        )
     first, second = values
     cells = {}
     for a in values[first]:
@@ -79,4 +51,4 @@ def parameter_map(
                 design_runs=design_runs,
                 progress=False,
             )
-    return ParameterMap((first, second), cells)
+    return cells

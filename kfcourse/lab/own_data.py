@@ -168,8 +168,6 @@ def estimate_record(
         The file, the model or the parameters cannot be used, or the filter left the finite numbers;
         the message says where.
     """
-    if structure not in STRUCTURES:
-        raise ValueError(f"structure must be one of {', '.join(STRUCTURES)}, got {structure!r}")
     record = read_measurements(path, variant.plain("estimates from a record"), columns)
 
     def build(model: Model) -> Filter:

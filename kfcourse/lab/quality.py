@@ -41,7 +41,6 @@ from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.parallel import cluster
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -179,16 +178,11 @@ def examine_all(
     seed: int = 1,
     jobs: int = 2,
     ask: Ask | None = None,
-    dask: str | None = None,
 ) -> Iterator[Quality]:
-    """`examine` every variant, in order, in so many processes, on which no number depends.
-
-    `dask` is the address of a Dask scheduler whose workers do it instead.
-    """
-    with cluster(dask):
-        parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
-        done = parallel(joblib.delayed(examine)(variant, runs, seed, ask) for variant in variants)
-        yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
+    """`examine` every variant, in order, in so many processes, on which no number depends."""
+    parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
+    done = parallel(joblib.delayed(examine)(variant, runs, seed, ask) for variant in variants)
+    yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
 
 LEGEND = """
@@ -362,7 +356,7 @@ def solvable(structures: Structures) -> Finding:
     """Whether the structural functions have a closed form of sensible length.  Value: operations of
     the Gaussian ones."""
     try:
-        parts = [structures.gaussian[name] for name in ("tau", "Theta", "h", "G", "F")]
+        parts = [*structures.gaussian.formulas.functions.values()]
         _ = structures.linearised
     except NoClosedForm as error:
         return Finding(False, str(error))

@@ -4,7 +4,7 @@ conclusion.
 `write_report` writes report.html (opens in any browser, without a network), report.tex and their
 figures; `write_json` the
 numbers.  The words of both languages are in report.toml; formulas, numbers and verdicts come from
-the model and the comparison (`report_sections`, `report_plain`; with modes `report_modes`).
+the model and the comparison (`report_sections`; with modes `report_modes`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from kfcourse.filters import Design, Filter
 from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
 from kfcourse.lab.report_modes import JumpReport
-from kfcourse.lab.report_plain import PlainReport
 from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
 from kfcourse.lab.short_names import JUMP_FILTERS, title
@@ -51,19 +50,11 @@ ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\}
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
-def _known_errors(result: Comparison, ax: Axes, words: plots.Words) -> Axes:
-    """The normalised errors, between a half and two: rare far trajectories reach beyond."""
-    plots.consistency(result, ax, names=result.entrants, words=words).set_ylim(0.5, 2)
-    ax.set_yticks([0.5, 1, 2], ["0.5", "1", "2"])
-    ax.set_yticks([], minor=True)
-    return ax
-
-
 FIGURES: dict[str, Callable[..., Axes]] = {
     "accuracy": plots.accuracy,
     "relative": plots.relative_accuracy,
     "ranking": plots.ranking,
-    "consistency": _known_errors,
+    "consistency": plots.consistency,
 }
 
 
@@ -79,14 +70,7 @@ def write_report(
 
     `known` are the filters that the model may admit, of which the report has a table; `modes` are
     the `recognised_modes`.
-
-    Raises
-    ------
-    ValueError
-        An unknown language.
     """
-    if language not in LANGUAGES:
-        raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     report = _report(result, language, modes)
     report.known = known
     content = {
@@ -114,7 +98,7 @@ def _report(
     return (
         JumpReport(result, words, modes)
         if isinstance(result.model, JumpModel)
-        else PlainReport(result, words)
+        else StudentReport(result, words)
     )
 
 
@@ -180,6 +164,9 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "own_variance": lists(result.own_variance),
         "score": {name: _number(result.score(name)) for name in ranking},
     }
+    for kind in ("log_score", "crps") if result.scored else ():
+        data[kind] = lists(getattr(result, kind))
+        data[f"{kind}_standard_error"] = lists(getattr(result, kind), "standard_error")
     if result.has_bound:
         data["above_bound"] = lists(result.gap, names=result.entrants)
         data["above_bound_standard_error"] = lists(result.gap, "standard_error", result.entrants)
@@ -207,9 +194,13 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
             "transition": [list(map(str, row)) for row in model.chain.tolist()],
             "first": model.first.tolist(),
         }
+
+    moves, object_ = model.between, {"state": model.state_equation}
+    if moves is not None:  # of the diffusion its rows
+        object_ = {"drift": moves.drift, "diffusion": moves.diffusion.tolist()}
+    equations = {**object_, "meter": model.meter_equation}
     return {
-        "state": [str(f) for f in model.state_equation],
-        "meter": [str(f) for f in model.meter_equation],
+        **{name: [*map(str, formulas)] for name, formulas in equations.items()},
         "parameters": {name: float(value) for name, value in model.parameters.items()},
         "inputs": {name: list(values) for name, values in model.known.inputs.items()},
         "interval": float(model.known.interval),
@@ -261,10 +252,13 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
     model = result.model
     if not isinstance(model, JumpModel):
         return None
-    compared = [
-        built for built in filters if isinstance(built, Filter) and built.name in result.names
+    of_modes = [
+        built
+        for built in filters
+        if isinstance(built, Filter)
+        and built.name in result.names
+        and JUMP_FILTERS[built.name].modes
     ]
-    of_modes = [built for built in compared if JUMP_FILTERS[built.name].modes]
     return (
         recognised(of_modes, model, min(result.runs, RECOGNISED), result.steps, result.seed)
         if of_modes

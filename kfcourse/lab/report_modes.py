@@ -17,7 +17,6 @@ from kfcourse.lab.report_text import in_percent, law, lines_of, matrix, printed
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised
-from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.writing import number_latex
 
@@ -32,11 +31,8 @@ class JumpReport(StudentReport):
 
     def __init__(self, result: Comparison, words: dict[str, str], modes: Recognised | None) -> None:
         super().__init__(result, words)
-        # `write_report` takes the other report for those without
-        assert isinstance(result.model, JumpModel)
-        self.model = result.model
         self.modes = modes
-        self.structures = JumpStructures(self.model)
+        self.structures: JumpStructures = JumpStructures(self.model)
         best = self.structures.best[0].name  # of the filters whose names do not tell
         self.kinds = [kind for kind in ("linearised", "gaussian") if kind in (*self.kinds, best)]
 
@@ -77,11 +73,8 @@ class JumpReport(StudentReport):
         yield Block("table", words["modes_table"], heading, rows)
         yield self.text("laws")
         lines = [rf"x_0 &\sim {law(model.prior)}"]
-        for symbol, laws in (
-            ("v_k", [mode.state_noise for mode in model.modes]),
-            ("w_k", [mode.meter_noise for mode in model.modes]),
-        ):
-            each = [law(of) for of in laws]
+        for symbol, noise in (("v_k", "state_noise"), ("w_k", "meter_noise")):
+            each = [law(getattr(mode, noise)) for mode in model.modes]
             same = all(text == each[0] for text in each)
             lines += (
                 [rf"{symbol} &\sim {each[0]}"]

@@ -1,24 +1,58 @@
-"""What all reports have: pieces, the comparison, the conclusion (`report_plain`, `report_modes`:
-what comes before)."""
+"""The student's report: task, derivations of the structural functions, equations of the filters,
+comparison and conclusion; of models with modes see `report_modes`."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import sympy as sp
 
+from kfcourse.filters import EQUATIONS
+from kfcourse.filters import latex as equations_latex
 from kfcourse.lab.admission import Admission
-from kfcourse.lab.report_text import cause, filled, in_percent, power_of_ten, ranges
-from kfcourse.lab.short_names import FILTERS, Entry
+from kfcourse.lab.checked_quadrature import Checked
+from kfcourse.lab.families import FAMILIES
+from kfcourse.lab.report_text import (
+    cause,
+    filled,
+    in_percent,
+    law,
+    lines_of,
+    matrix,
+    power_of_ten,
+    printed,
+    ranges,
+    written_lines,
+)
+from kfcourse.lab.short_names import FILTERS, Entry, Structures
 from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.structure import FUNCTION_LATEX
+from kfcourse.symbolic.writing import formula_latex, number_latex
 
 ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
+HIGHEST = 8  # moment that is printed
+
+# Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
+# gives.
+CATALOGUE = {
+    ("tau", "c*z"): 2,
+    ("Theta", "c**2*p + e**2*z**2"): 15,
+    ("Theta", "c**2*p + e**2*p + e**2*z**2"): 22,
+    ("h", "g*m"): 5,
+    ("G", "g"): 8,
+    ("F", "d*g**2 + f**2*m**4"): 16,
+    ("F", "3*d**2*f**2 + 6*d*f**2*m**2 + d*g**2 + f**2*m**4"): 20,
+}
 
 
 @dataclass(frozen=True)
@@ -37,13 +71,22 @@ def formulas(lines: list[str]) -> Block:
 
 
 class StudentReport:
-    """The blocks of the report, section by section; a subclass has the task, the functions and the
-    filters."""
+    """The blocks of the report, section by section."""
 
     entries: Mapping[str, Entry] = FILTERS  # where filters have their names from
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
+        # of an object that moves in continuous time: some words are others
+        moves = getattr(result.model, "between", None)
+        self.kind, self.numbers = "", {}
+        if moves is not None:
+            accuracy = number_latex(moves.accuracy)
+            self.kind, self.numbers = "_between", {"substeps": moves.substeps, "accuracy": accuracy}
+        self.model: Any = result.model
+        self.structures = Structures(self.model)
+        # kinds whose formulas are found in time, and are not too long
+        self.derivable: list[str] = []
         self.known: Sequence[Admission] = ()
         self.kinds = [
             kind
@@ -61,11 +104,8 @@ class StudentReport:
 
     def phrase(self, key: str, **values: object) -> str:
         """The words of that name, filled with what they speak of."""
-        return (
-            filled(self.words[key], self.words["thousands"], **values)
-            if values
-            else self.words[key]
-        )
+        text, values = self.words.get(key + self.kind, self.words[key]), self.numbers | values
+        return filled(text, self.words["thousands"], **values) if values else text
 
     def section(self, key: str) -> Block:
         return Block("section", self.words[key])
@@ -106,22 +146,170 @@ class StudentReport:
         return cause(answer.reason, self.result.model, self.words) if answer.reason else answer.says
 
     def task(self) -> Iterator[Block]:
-        """The equations, the laws, and what is asked for."""
-        raise NotImplementedError
+        model, moves = self.model, self.model.between
+        yield self.section("task")
+        yield self.text("task_text")
+        lines = lines_of(model.latex(values=False, indexed=True))
+        if moves is None and model.n == model.p == 1:  # what a and b are called below
+            k = ", k" if model.timed else ""
+            for i, call in enumerate((f"a(x_k, v_k{k})", f"b(x_k, w_k{k})")):
+                lines[i] = lines[i].replace("&=", f"&= {call} =", 1)
+        yield formulas([*lines, *model.known.latex("t" if moves is None else "t_{k}")])
+        if moves is not None and any(moves.correction):
+            yield self.text("stratonovich")
+            added = enumerate(moves.correction, 1)
+            yield formulas([rf"\Delta a_{i} &= {formula_latex(of, model.x)}" for i, of in added])
+        values = ", ".join(
+            f"${sp.latex(name)} = {number_latex(float(value))}$"
+            for name, value in model.values.items()
+        )
+        if values:
+            yield self.text("parameters", values=values)
+        laws = {"x_0": model.prior, "v_k": model.state_noise, "w_k": model.meter_noise}
+        if moves is not None:
+            del laws["v_k"]
+        yield formulas([rf"{name} &\sim {law(of)}" for name, of in laws.items()])
+        yield self.text("independent")
+        yield self.text(
+            "find", filters=", ".join(self.title(name) for name in self.result.entrants)
+        )
 
     def functions(self) -> Iterator[Block]:
-        """The structural functions."""
-        raise NotImplementedError
+        if self.kinds:
+            yield self.section("functions")
+        for kind in self.kinds:
+            yield from self.defined(kind)
+            if self.model.n == self.model.p == 1:
+                yield from getattr(self, kind)()
+            yield from self.derived(kind)
+
+    def linearised(self) -> Iterator[Block]:
+        """The derivatives of a scalar model."""
+        model, moves = self.model, self.model.between
+        object_ = (model.state_equation, model.v) if moves is None else (moves.drift, ())
+        sides = ((*object_, "a", "v"), (model.meter_equation, model.w, "b", "w"))
+        derivatives = [
+            rf"\frac{{\partial {letter}}}{{\partial {by}}} &= "
+            rf"{formula_latex(equation[0].diff(symbol), model.x, noises)}"
+            for equation, noises, letter, noise in sides
+            for by, symbol in [
+                ("x", model.x[0]),
+                *([(noise, noises[0])] if len(noises) == 1 else []),
+            ]
+        ]
+        yield self.text("derivatives")
+        yield formulas(derivatives)
+
+    def gaussian(self) -> Iterator[Block]:
+        """The means of a scalar model, step by step."""
+        if conditional := self.conditional():
+            yield self.text("conditional")
+            yield formulas(conditional)
+        if moments := self.moments():
+            yield self.text("recursion")
+            yield formulas(
+                [r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments]
+            )
+        elif not self.structures.quadrature:
+            yield self.text("exponentials")
+
+    def conditional(self) -> list[str]:
+        """Means of a, a^2, b, b^2 over their noise, at a fixed state; a drift has none."""
+        model, lines = self.model, []
+        for formula, noises, noise, first, second in (
+            (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
+            (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
+        )[model.between is not None :]:
+            over = GaussianMoments(
+                list(noises), list(exact_matrix(noise.mean)), sp.Matrix(exact_matrix(noise.cov))
+            )
+            for letter, power in ((first, 1), (second, 2)):
+                try:
+                    mean = sp.expand(over.mean_of(formula**power))
+                except NoClosedForm:
+                    # the mean over noise and state together has a closed form, this one has none
+                    continue
+                lines.append(f"{letter}(x) &= {formula_latex(mean, model.x)}")
+        return lines
+
+    def moments(self) -> list[str]:
+        """The moments q_2 ... that the meter and the object need, if they are polynomials."""
+        (x,), moves = self.model.x, self.model.between
+        sides = [self.model.state_equation[0] ** 2, self.model.meter_equation[0] ** 2]
+        if moves is not None:
+            sides[:1] = moves.drift[0], (moves.diffusion * moves.diffusion.T)[0]
+        if not all(side.is_polynomial(x) for side in sides):
+            return []
+        m, d = sp.symbols("m d", real=True)
+        law = GaussianMoments([x], [m], sp.Matrix([[d]]))
+        highest = min(max(int(sp.degree(sp.expand(side), x)) for side in sides), HIGHEST)
+        return [
+            f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}"
+            for n in range(2, highest + 1)
+        ]
+
+    def derived(self, kind: str) -> Iterator[Block]:
+        """The five functions, with their numbers in the catalogue where it has them."""
+        if kind == "gaussian" and isinstance(checked := self.structures.quadrature, Checked):
+            yield self.text("by_quadrature", order=checked.order)
+            return
+        yield self.text("result")
+        if (lines := printed(self.structures, kind)) is None:
+            yield self.text("not_printed")
+            return
+        self.derivable.append(kind)
+        yield formulas(lines)
+        if self.model.n == self.model.p == 1:
+            structure = getattr(self.structures, kind)
+            functions = structure.formulas.functions
+            forms = {name: (name, str(sp.expand(structure[name]))) for name in functions}
+            numbers = [
+                f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}"
+                for name, form in forms.items()
+                if form in CATALOGUE
+            ]
+            if numbers:
+                yield self.text("catalogue", numbers=", ".join(numbers))
 
     def defined(self, kind: str) -> Iterator[Block]:
         """The heading of a kind of structural functions, and what they are."""
         yield Block("subsection", self.words[kind])
         yield self.text(f"{kind}_text")
-        yield formulas(self.words[f"{kind}_formulas"].split("\n"))
+        yield formulas(self.phrase(f"{kind}_formulas").split("\n"))
 
     def filters(self) -> Iterator[Block]:
-        """The equations of the filters."""
-        raise NotImplementedError
+        words = self.words
+        yield self.section("filters")
+        yield self.text("start")
+        mean, cov = self.model.prior
+        yield formulas(
+            [rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"]
+        )
+        families = dict.fromkeys(self.entries[name].family for name in self.result.entrants)
+        designed = next((family for family in families if family != "aof"), "")
+        for family in filter(EQUATIONS.get, families):
+            heading = (
+                FAMILIES[family].russian_heading
+                if words["language"] == "ru"
+                else FAMILIES[family].heading
+            )
+            yield Block("subsection", heading)
+            if family == "duof":
+                yield self.text("criteria")
+                yield formulas(self.phrase("criteria_formulas").split("\n"))
+            yield formulas(lines_of(equations_latex(EQUATIONS[family])))
+            if family == "aof" and self.model.n == self.model.p == 1:
+                for name in (
+                    f"aof-{kind}"
+                    for kind in self.derivable
+                    if f"aof-{kind}" in self.result.entrants
+                ):
+                    yield self.text("written_out", name=self.title(name))
+                    yield formulas(
+                        written_lines(getattr(self.structures, name.removeprefix("aof-")))
+                    )
+            if family == designed:
+                yield self.text("over_ensemble")
 
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
@@ -162,13 +350,12 @@ class StudentReport:
                 "figure", self.phrase(f"figure_{name}", reference=reference, level=LEVEL), [name]
             )
         if "ranking" in self.figures:
-            gaps = [
-                words["diverges"] if name in result.lost else in_percent(gap)
-                for name, gap in result.ranking()
-            ]
             rows = [
-                [self.title(name), gap]
-                for (name, _), gap in zip(result.ranking(), gaps, strict=True)
+                [
+                    self.title(name),
+                    words["diverges"] if name in result.lost else in_percent(gap),
+                ]
+                for name, gap in result.ranking()
             ]
             yield Block(
                 "table",
@@ -176,6 +363,11 @@ class StudentReport:
                 [words["filter"], "%"],
                 rows,
             )
+        if result.scored:
+            below = self.phrase("score_below", name=self.title(result.reference))
+            heading = [words["filter"], words["log_score"], below, "CRPS"]
+            rows = [[self.title(name), *score_cells(result, name)] for name in result.names]
+            yield Block("table", self.phrase("scores_table", level=LEVEL), heading, rows)
 
     def remarks(self) -> Iterator[str]:
         """What a reader must know before he relies on distances from the bound."""
@@ -202,14 +394,13 @@ class StudentReport:
 
     def conclusion(self) -> Iterator[Block]:
         result, words = self.result, self.words
+        yield self.section("conclusion")
         if len(result.entrants) == 1:
-            yield self.section("conclusion")
             yield Block(
                 "text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control")
             )
             return
         verdicts = result.verdicts()
-        yield self.section("conclusion")
         yield self.text("verdict_text", level=LEVEL)
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
@@ -281,6 +472,19 @@ class StudentReport:
         entry = self.entries[name]
         exact = self.words["exact_title"] if name == EXACT else ""
         return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
+
+
+def score_cells(result: Comparison, name: str) -> list[str]:
+    """Log score of a filter's predictions, how far it is below the reference's, and CRPS: means
+    over the steps and half of their intervals."""
+    every = slice(None)
+    estimates = (
+        result.log_score(name, steps=every),
+        result.log_score(result.reference, minus=name, steps=every),
+        result.crps(name, steps=every),
+    )
+    texts = (f"{each.value:.4f} ± {each.half_width():.4f}" for each in estimates)
+    return [text.replace("nan ± nan", "–") for text in texts]
 
 
 def table_steps(result: Comparison) -> list[int]:

@@ -81,17 +81,17 @@ class Structures:
         checked = self.quadrature
         return self.gaussian if checked is None else self._each(checked.structures)
 
+    @property
+    def best(self) -> Any:
+        """Gaussian ones if they can be had, else linearised ones."""
+        return self.linearised if isinstance(self.quadrature, NoClosedForm) else self.normal
+
     def _each(self, structures: list[Structure]) -> Any:
         return structures if self.jumps else structures[0]
 
 
 class JumpStructures(Structures):
     """Those of a model that jumps: of each mode, and averaged over the modes."""
-
-    @property
-    def best(self) -> list[Structure]:
-        """Gaussian ones if they can be had, else linearised ones."""
-        return self.linearised if isinstance(self.quadrature, NoClosedForm) else self.normal
 
     @cached_property
     def averaged(self) -> Structure:
@@ -337,10 +337,8 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
 def judging(model: Model | JumpModel) -> Structure:
     """The structural functions by which predictions of measurements are judged: the best ones,
     averaged over modes."""
-    if isinstance(model, JumpModel):
-        return JumpStructures(model).averaged
-    of = Structures(model)
-    return of.linearised if isinstance(of.quadrature, NoClosedForm) else of.normal
+    jumps = isinstance(model, JumpModel)
+    return JumpStructures(model).averaged if jumps else Structures(model).best
 
 
 def exact(model: Model | JumpModel) -> Filter:

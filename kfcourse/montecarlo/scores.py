@@ -3,8 +3,13 @@
     log score  ln p(y_k | y_0, ..., y_{k-1})
     CRPS       Integral (P(y | y_0, ..., y_{k-1}) - [y >= y_k])^2 dy
 
-Of N(h, F) with the deviation s = sqrt(F) and z = (y - h) / s the second is s (z (2 Phi(z) - 1) +
-2 phi(z) - 1 / sqrt(pi)): T. Gneiting and A. Raftery (2007).
+With a(m, s) = M|u| of u ~ N(m, s^2), which is m (2 Phi(m / s) - 1) + 2 s phi(m / s), the second
+of a mixture of N(h_i, s_i^2) with the weights w_i is
+
+    sum w_i a(y - h_i, s_i) - sum w_i w_j a(h_i - h_j, sqrt(s_i^2 + s_j^2)) / 2,
+
+and of a single normal law a(y - h, s) - s / sqrt(pi): T. Gneiting and A. Raftery (2007); E. Grimit
+and others, Q. J. R. Meteorol. Soc. 132 (2006).
 """
 
 from __future__ import annotations
@@ -21,21 +26,34 @@ def scored(
     chosen: Filter, structure: Structure, before: State, y: Array, after: State
 ) -> tuple[Array, Array]:
     """Both scores of the measurement y (runs, p) for each trajectory, (runs,), by the filter's own
-    structural functions, or these; NaN for the second where the prediction is not a normal law."""
-    if chosen.evidence is not None:
+    structural functions, or these; NaN for the second where the prediction is neither a normal law
+    nor a mixture of some."""
+    if chosen.mixture is not None:
+        weights, laws = chosen.mixture(before)
+    elif chosen.evidence is not None:
         return chosen.evidence(before, y, after), np.full(len(y), np.nan)
-    expected = after.expected
-    if expected is None:
-        expected = (chosen.structure or structure).at(before.step).measure(*before.predicted)
-    variance = np.diagonal(expected.F, axis1=-2, axis2=-1)
-    crps = crps_of_normal(expected.innovation(y), np.sqrt(variance)).sum(axis=-1)
-    return log_density(expected, y), crps
+    else:
+        expects = (chosen.structure or structure).at(before.step).measure
+        weights, laws = np.ones((1, 1)), [after.expected or expects(*before.predicted)]
+    log = chosen.evidence(before, y, after) if chosen.evidence else log_density(laws[0], y)
+    errors = np.stack([law.innovation(y) for law in laws], axis=-1)
+    variances = [np.diagonal(law.F, axis1=-2, axis2=-1) for law in laws]
+    deviations = np.sqrt(np.stack(np.broadcast_arrays(y, *variances)[1:], axis=-1))
+    return log, crps(errors, deviations, weights[:, None]).sum(axis=-1)
 
 
-def crps_of_normal(error: Array, deviation: Array) -> Array:
-    """Of what came less the mean, and the deviation; |error| where that is 0."""
+def crps(errors: Array, deviations: Array, weights: Array) -> Array:
+    """Of a mixture: what came less each mean, deviations, weights, (..., M) -> (...)."""
+    value = (weights * mean_size(errors, deviations)).sum(axis=-1)
+    for i in range(errors.shape[-1]):
+        apart, both = errors[..., i, None] - errors, np.hypot(deviations[..., i, None], deviations)
+        value -= (weights * weights[..., i, None] * mean_size(apart, both)).sum(axis=-1) / 2
+    return value
+
+
+def mean_size(mean: Array, deviation: Array) -> Array:
+    """M|u| of u ~ N(mean, deviation^2)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        z = np.where(deviation > 0, error / deviation, np.inf)
-        height = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
-        value = deviation * (z * (2 * ndtr(z) - 1) + 2 * height - 1 / np.sqrt(np.pi))
-    return np.where(deviation > 0, value, np.abs(error))
+        z = np.where(deviation > 0, mean / deviation, 0.0)
+    height = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
+    return np.where(deviation > 0, mean * (2 * ndtr(z) - 1) + 2 * deviation * height, np.abs(mean))

@@ -15,10 +15,10 @@ from typing import Any
 import sympy as sp
 
 from kfcourse.filters import aof
-from kfcourse.lab.maps import ParameterMap
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.laws import Array
 from kfcourse.linear.consistency import autocorrelation, chi_squared_bounds, innovations
+from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.experiment import predictions
 from kfcourse.pages.browser import model_source
 from kfcourse.pages.explore import columns, drawn, line_style, rounded, value
@@ -211,7 +211,7 @@ def grid_step(
     )
 
 
-def leading(map_: ParameterMap) -> dict[str, Any]:
+def leading(cells: dict[tuple[float, float], Comparison]) -> dict[str, Any]:
     """What `who_leads` shows of a map whose first parameter has one value: in per cent, with 95 %
     intervals.
 
@@ -223,7 +223,7 @@ def leading(map_: ParameterMap) -> dict[str, Any]:
         step the most accurate filter and how many others are not significantly worse.
     """
     ratios, gaps, leaders = [], [], []
-    for (first, second), result in map_.cells.items():
+    for (first, second), result in cells.items():
         ratios.append(float(f"{second / first:.3g}"))
         steps = range(len(result.gap(LAB[0]).value))
         of = {name: (result.gap(name).value, *result.gap(name).interval()) for name in LAB}
@@ -238,7 +238,7 @@ def leading(map_: ParameterMap) -> dict[str, Any]:
         )
         order = [result.leaders(k) for k in steps]
         leaders.append([(best, len(others)) for best, *others in order])
-    exact = min(result.runs for result in map_.cells.values())
+    exact = min(result.runs for result in cells.values())
     return {"trajectories": exact, "ratios": ratios, "gaps": gaps, "leaders": leaders}
 
 

@@ -20,45 +20,18 @@ class AngleWarning(UserWarning):
 
 def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list[str]) -> Angles:
     """The components named, in a list or under the keys x and y."""
-    known = {"x": x, "y": y}
-    if isinstance(given, Mapping):
-        if set(given) - set(known):
-            raise ModelError(
-                f"`angles` has the keys x and y, not {', '.join(map(str, set(given) - set(known)))}"
-            )
-        chosen = {key: _names(names) for key, names in given.items()}
-    else:
-        names = [] if given is None else _names(given)
-        if both := [name for name in names if name in x and name in y]:
-            raise ModelError(
-                f"{both[0]} is the name of a state and of a measurement: say which is an angle, "
-                f"angles={{'x': ['{both[0]}']}} or angles={{'y': ['{both[0]}']}}"
-            )
-        chosen = {key: [name for name in names if name in known[key]] for key in known}
-        chosen["y"] += [name for name in names if name not in x + y]
-    for key, names in chosen.items():
-        if unknown := [name for name in names if name not in known[key]]:
-            raise ModelError(
-                f"`angles` names {', '.join(map(str, unknown))}; components are {', '.join(x)} "
-                f"and {', '.join(y)}"
-            )
-    return Angles(
-        *(
-            tuple(i for i, name in enumerate(known[key]) if name in chosen.get(key, ()))
-            for key in known
-        )
-    )
-
-
-def _names(given: Any) -> list[str]:
-    """A name or a list of names, as a list."""
-    names = [given] if isinstance(given, str) else given
-    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-        raise ModelError(
-            f'`angles` must name components, as in ["y2"] or {{x = ["psi"]}}, got {shown(given)}; '
-            f"leave it out if there is none"
-        )
-    return [*names]
+    components, places = {"x": x, "y": y}, dict[str, set[int]](x=set(), y=set())
+    for key, names in (given if isinstance(given, Mapping) else {"": given or []}).items():
+        for name in [names] if isinstance(names, str) or not isinstance(names, Sequence) else names:
+            kinds = [kind for kind in components if name in components[kind] and key in ("", kind)]
+            if len(kinds) != 1:
+                raise ModelError(
+                    f"`angles`: {shown(name)} is not the name of one component; name some of "
+                    f"{', '.join(x)} and {', '.join(y)} in a list, or in lists under the keys x "
+                    "and y where a state and a measurement have one name"
+                )
+            places[kinds[0]].add(components[kinds[0]].index(name))
+    return Angles(*(tuple(sorted(places[kind])) for kind in components))
 
 
 def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:

@@ -61,20 +61,14 @@ def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:
 
     def measure(m: Array, d: Array) -> Measurement:
         parts = [structure.measure(m, d) for structure in now]
-        h, G = (_mean(before, [getattr(part, name) for part in parts]) for name in "hG")
-        spreads = [part.R + _form(part.G - G, d) + _square(part.h - h) for part in parts]
-        R = _mean(before, spreads)
+        slopes = [part.G for part in parts]
+        h, G, R = _mixed(before, [part.h for part in parts], slopes, [part.R for part in parts], d)
         return Measurement(h, G, _form(G, d) + R, R)
 
     def transition(z: Array, p: Array) -> Transition:
-        parts = [structure.transition(z, p) for structure in now]
         taus = [structure.predict(z, p).mean for structure in now]
-        tau, A = _mean(after, taus), _mean(after, [part.A for part in parts])
-        spreads = [
-            Q + _form(slope - A, p) + _square(mean - tau)
-            for (slope, Q), mean in zip(parts, taus, strict=True)
-        ]
-        return Transition(A, _mean(after, spreads))
+        slopes, rests = zip(*(structure.transition(z, p) for structure in now), strict=True)
+        return Transition(*_mixed(after, taus, slopes, rests, p)[1:])
 
     return Structure("averaged", model.modes[0], predict, measure, transition)
 
@@ -109,7 +103,24 @@ def _check(model: JumpModel) -> None:
         )
 
 
-def _mean(weights: Array, values: list[Array]) -> Array:
+def _mixed(
+    weights: Array,
+    means: Sequence[Array],
+    slopes: Sequence[Array],
+    rests: Sequence[Array],
+    cov: Array,
+) -> tuple[Array, Array, Array]:
+    """Mean, slope, and covariance that the slope does not explain, of affine functions with these
+    weights over a law with this covariance."""
+    mean, slope = _mean(weights, means), _mean(weights, slopes)
+    spreads = [
+        rest + _form(own - slope, cov) + _square(value - mean)
+        for value, own, rest in zip(means, slopes, rests, strict=True)
+    ]
+    return mean, slope, _mean(weights, spreads)
+
+
+def _mean(weights: Array, values: Sequence[Array]) -> Array:
     return sum((q * value for q, value in zip(weights, values, strict=True)), np.zeros(()))
 
 

@@ -27,8 +27,6 @@ FUNCTIONS = {name: getattr(sp, name) for name in NAMES.split()} | {"abs": sp.Abs
 # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
 ARGUMENTS = {"atan2": 2}
 CONSTANTS = {"pi": sp.pi}
-# Piecewise((x, x < 1), (1, True)), which may also be typed as x if x < 1 else 1
-PIECEWISE = "Piecewise"
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.USub: operator.neg, ast.UAdd: operator.pos, ast.And: sp.And, ast.Or: sp.Or,
@@ -72,7 +70,7 @@ def check_name(name: str) -> str:
         problem = "cannot name a symbol: use letters, digits and _, a letter first"
     elif keyword.iskeyword(name):
         problem = f"is a reserved word of Python; choose another name, such as {name}_"
-    elif name in FUNCTIONS or name in CONSTANTS or name == PIECEWISE:
+    elif name in FUNCTIONS or name in CONSTANTS:
         problem = "already means a function or constant in formulas; choose another name"
     if problem:
         raise ModelError(f"{name!r} {problem}")
@@ -86,7 +84,7 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     ----------
     formula : str
         Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi``, the names in
-        `symbols`, and choices: ``2 if t < 45 else 0``, or ``Piecewise((2, t < 45), (0, True))``.
+        `symbols`, and choices: ``2 if t < 45 else 0``.
     symbols : dict
         Name to SymPy symbol; any other name is an error.
 
@@ -107,8 +105,6 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         expression = Reader(formula, symbols, offset).read(tree)
     except RecursionError:
         raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
-    except TypeError:  # SymPy's, where numbers that are not real are compared
-        raise FormulaError(formula, "the formula compares what has no real value") from None
     if _degree(expression) > MAX_DEGREE:
         raise FormulaError(
             formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it"
@@ -216,8 +212,6 @@ class Reader:
                 return self.power(node)
             case ast.BinOp() if isinstance(node.op, ARITHMETIC):
                 return OPERATORS[type(node.op)](self.read(node.left), self.read(node.right))
-            case ast.Call(func=ast.Name(id="Piecewise")):
-                return self.piecewise(node)
             case ast.Call():
                 return self.call(node)
             case ast.IfExp():
@@ -278,34 +272,15 @@ class Reader:
             )
         return result
 
-    def piecewise(self, node: ast.Call) -> sp.Expr:
-        pairs = [arg.elts for arg in node.args if isinstance(arg, ast.Tuple) and len(arg.elts) == 2]
-        if node.keywords or not pairs or len(pairs) < len(node.args):
-            raise self.fail(
-                node,
-                "Piecewise takes pairs (formula, condition), as in Piecewise((x, x < 1), (1, "
-                "True))",
-            )
-        read = [(self.read(formula), self.condition(condition)) for formula, condition in pairs]
-        if read[-1][1] is not sp.true:
-            raise self.fail(
-                node,
-                "the last pair of Piecewise holds for the rest and must have the condition True",
-            )
-        return sp.Piecewise(*read)
-
     def condition(self, node: ast.expr) -> Boolean:
         match node:
             case ast.Constant(value=bool()):
                 return sp.true if node.value else sp.false
             case ast.Compare() if all(isinstance(op, COMPARISONS) for op in node.ops):
                 sides = pairwise([self.read(side) for side in (node.left, *node.comparators)])
-                parts = [
-                    OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, sides, strict=True)
-                ]
-                if any(map(undecided, parts)):
-                    raise self.fail(node, f"{UNDECIDED}; write the one that holds")
-                return sp.And(*parts)
+                return sp.And(
+                    *(OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, sides, strict=True))
+                )
             case ast.BoolOp():
                 return OPERATORS[type(node.op)](*map(self.condition, node.values))
             case ast.UnaryOp(op=ast.Not()):
@@ -339,15 +314,6 @@ class Reader:
         if any(argument.is_number and abs(argument) >= MAX_ARGUMENT for argument in arguments):
             raise self.fail(node, f"the argument of {node.func.id} is too large")
         return FUNCTIONS[node.func.id](*arguments)
-
-
-UNDECIDED = "the choice depends on numbers that do not differ in 15 digits"
-
-
-def undecided(condition: Boolean) -> bool:
-    """Whether a condition has no symbols, and yet SymPy does not find its value; a Piecewise with
-    it would never be ready."""
-    return not condition.free_symbols and condition not in (sp.true, sp.false)
 
 
 def _degree(expression: sp.Expr) -> int:

@@ -34,6 +34,7 @@ from kfcourse.symbolic.reading import (
     shown,
     table,
 )
+from kfcourse.symbolic.typesetting import aligned
 
 # in which modes may differ
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")
@@ -180,20 +181,8 @@ class JumpModel:
             return np.broadcast_to(self.transition_at(k), (*x.shape[:-1], size, size))
         with np.errstate(all="ignore"):
             rows = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
-            total = rows.sum(axis=-1, keepdims=True)
-            wrong = ~((rows >= 0) & (np.abs(total - 1) <= SUM)).all(axis=(-2, -1)) & np.isfinite(
-                x
-            ).all(axis=-1)
-        if wrong.any():
-            problem, place = (
-                _not_probabilities(rows[wrong][0]),
-                ", ".join(f"{value:g}" for value in x[wrong][0]),
-            )
-            raise ModelError(
-                f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {place}: "
-                f"{problem}"
-            )
-        return rows / total
+            _probabilities(f"`transition` at step {k}", rows[np.isfinite(x).all(axis=-1)])
+            return rows / rows.sum(axis=-1, keepdims=True)
 
     def transition_at(self, k: int) -> Array:
         """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends
@@ -201,12 +190,7 @@ class JumpModel:
         self.without_state("a matrix of transitions for all states")
         with np.errstate(all="ignore"):
             rows = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
-        if problem := _not_probabilities(rows):
-            raise ModelError(
-                f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} "
-                f"steps"
-            )
-        return rows / rows.sum(axis=1, keepdims=True)
+        return _probabilities(f"`transition` at step {k}", rows)
 
     def law_at(self, k: int) -> Array:
         """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError
@@ -216,28 +200,15 @@ class JumpModel:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
 
-    def replace(self, **parameters: float) -> JumpModel:
-        """The same model with parameters changed in all modes."""
-        modes = tuple(mode.replace(**parameters) for mode in self.modes)
-        if self.chain.has(*(symbol(name) for name in parameters)):
-            raise ModelError(
-                f"`transition` contains {', '.join(parameters)}: define the model anew"
-            )
-        return JumpModel(self.names, modes, self.first, self.chain, self.chain_of_step)
-
     def latex(self) -> str:
         """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned`
         block."""
         lines = []
         for name, mode in zip(self.names, self.modes, strict=True):
-            block = mode.latex().removeprefix("\\begin{aligned}\n").removesuffix("\n\\end{aligned}")
-            lines += [
-                rf"\text{{mode {name.replace('_', chr(92) + '_')}:}}\quad &",
-                *block.split(" \\\\\n"),
-            ]
+            title = name.replace("_", r"\_")
+            lines += [rf"\text{{mode {title}:}}\quad &", *mode.lines()]
         first = sp.Matrix([[sp.Float(share, 4) for share in self.first]])
-        lines += [rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"]
-        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+        return aligned([*lines, rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"])
 
     def __repr__(self) -> str:
         texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
@@ -278,21 +249,15 @@ def _tables(modes: Any) -> dict[str, dict[str, Any]]:
 def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...]:
     """The modes, if they are of one state, measurement and noises; ModelError if not."""
 
-    def sizes(mode: Model) -> dict[str, int]:
-        noises = {"noise(s) of the object": len(mode.v), "noise(s) of the meter": len(mode.w)}
-        return {"state component(s)": mode.n, "measurement component(s)": mode.p} | noises
+    def form(mode: Model) -> tuple[Any, ...]:
+        return mode.x, mode.angles, mode.p, len(mode.v), len(mode.w)
 
-    first, needed = modes[0], sizes(modes[0])
     for name, mode in zip(names, modes, strict=True):
-        for what, size in sizes(mode).items():
-            if size != needed[what]:
-                raise ModelError(
-                    f"all modes need as many {what}: mode {names[0]} has {needed[what]}, mode "
-                    f'{name} has {size}; name noises by `symbols`, such as v = ["v1", "v2"]'
-                )
-        if mode.x != first.x or mode.angles != first.angles:
+        if form(mode) != form(modes[0]):
             raise ModelError(
-                f"modes {names[0]} and {name} differ in their state's symbols or angles"
+                f"modes {names[0]} and {name} differ in their state's symbols or angles, or in the "
+                "number of measurement components or noises; name noises by `symbols`, such as "
+                'v = ["v1", "v2"]'
             )
     return tuple(modes)
 
@@ -358,17 +323,15 @@ def _law(first: Any, size: int) -> Array:
             f"`first` must be {size} probabilities for {size} mode(s), those of the modes at the "
             f"first measurement; got {shown(first)}"
         )
-    if problem := _not_probabilities(law[None]):
-        raise ModelError(f"`first`: {problem}")
-    return law / law.sum()
+    return _probabilities("`first`", law)
 
 
-def _not_probabilities(matrix: Array) -> str:
-    """What is wrong with the rows; empty if nothing."""
-    for number, row in enumerate(matrix.tolist()):
-        which = f"row {number + 1}" if len(matrix) > 1 else "the row"
-        if not np.isfinite(row).all() or min(row) < 0:
-            return f"{which} has an entry that is no probability: {row}"
-        if abs(sum(row) - 1) > SUM:
-            return f"{which} sums to {sum(row):g}, not to 1: {row}"
-    return ""
+def _probabilities(what: str, rows: Array) -> Array:
+    """Rows (..., J) that sum to 1; ModelError for those that are none."""
+    total = rows.sum(axis=-1, keepdims=True)
+    wrong = ~((rows >= 0).all(axis=-1) & (np.abs(total[..., 0] - 1) <= SUM))
+    if wrong.any():
+        raise ModelError(
+            f"{what}: {rows[wrong][0].tolist()} are no probabilities, at least 0 and together 1"
+        )
+    return np.asarray(rows / total)

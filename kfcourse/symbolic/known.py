@@ -19,7 +19,9 @@ from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
     ModelError,
+    exact_matrix,
     exact_number,
+    law,
     of_numbers,
     read,
     shown,
@@ -74,16 +76,8 @@ class Known:
     @property
     def steps(self) -> float:
         """For how many steps the inputs have values; infinite if nothing ends."""
-        return min(
-            [
-                np.inf,
-                *(
-                    len(values)
-                    for name, values in self.inputs.items()
-                    if symbol(name) in self.symbols
-                ),
-            ]
-        )
+        ends = (len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols)
+        return min([np.inf, *ends])
 
     def at(self, k: int) -> Array:
         """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
@@ -101,20 +95,14 @@ class Known:
             return values[k]
         return float(k if name == "k" else self.interval * k)
 
-    def latex(self) -> list[str]:
-        """Lines of an `aligned` block: the time, and the first values of the inputs."""
-        lines = (
-            [rf"t &= {sp.latex(self.interval * symbol('k'))}"]
-            if symbol("t") in self.symbols
-            else []
-        )
+    def latex(self, time: str = "t") -> list[str]:
+        """Lines of an `aligned` block: the time of a step, and the first values of the inputs."""
+        clock = symbol("t") in self.symbols and "t" not in self.inputs
+        lines = [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"] if clock else []
         for name, values in self.inputs.items():
-            shown = ", ".join(f"{value:g}" for value in values[:6]) + (
-                r", \ldots" if len(values) > 6 else ""
-            )
-            lines.append(
-                rf"{sp.latex(symbol(name))}_0, {sp.latex(symbol(name))}_1, \ldots &= {shown}"
-            )
+            letter, more = sp.latex(symbol(name)), [r"\ldots"] if len(values) > 6 else []
+            listed = ", ".join([*(f"{value:g}" for value in values[:6]), *more])
+            lines.append(rf"{letter}_0, {letter}_1, \ldots &= {listed}")
         return lines
 
 
@@ -187,33 +175,24 @@ def varying_law(
         What takes the place of each such noise in the equations, and the law that is left for the
         noises.
     """
-    law, size = table(what, given), len(noises)
-    variance = law.get("variance")
-    entries = variance if isinstance(variance, Sequence) else []
-    entries = [variance] * size if _is_formula(variance) else [*entries]
-    if any(isinstance(row, list | tuple) and any(map(_is_formula, row)) for row in entries):
-        raise ModelError(
-            f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that "
-            "change with time into the equation, as in (1 + k)*v1 + k*v2"
-        )
+    parts, size = table(what, given), len(noises)
+    variance = parts.get("variance")
+    entries = [variance] * size
+    if isinstance(variance, Sequence) and not isinstance(variance, str):
+        entries = [*variance]
     formulas = {
         i: read(entry, symbols, what) for i, entry in enumerate(entries) if _is_formula(entry)
     }
     if not formulas:
-        return {}, law
-    mean = law.get("mean", 0.0)
-    means = [mean] * size if np.ndim(mean) == 0 else [*mean]
-    if len(entries) != size or len(means) != size:
-        raise ModelError(
-            f"`{what}`: {len(entries)} variances and {len(means)} means for {size} noise(s); give "
-            f"one for each"
-        )
-    law["mean"] = [0.0 if i in formulas else entry for i, entry in enumerate(means)]
-    law["variance"] = [1.0 if i in formulas else entry for i, entry in enumerate(entries)]
-    shift = {i: exact_number(f"`{what}`: mean", means[i]) for i in formulas}
-    return {
-        noises[i]: shift[i] + sp.sqrt(formula) * noises[i] for i, formula in formulas.items()
-    }, law
+        return {}, parts
+    if len(entries) != size:
+        raise ModelError(f"`{what}`: {len(entries)} variances for {size} noise(s): one for each")
+    mean = exact_matrix(law(what, {"mean": parts.get("mean", 0.0)}, size).mean)
+    changes = {noises[i]: mean[i] + sp.sqrt(formula) * noises[i] for i, formula in formulas.items()}
+    return changes, {
+        "mean": [0.0 if i in formulas else float(mean[i]) for i in range(size)],
+        "variance": [1.0 if i in formulas else entry for i, entry in enumerate(entries)],
+    }
 
 
 def _is_formula(entry: Any) -> bool:

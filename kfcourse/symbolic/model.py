@@ -24,6 +24,7 @@ import sympy as sp
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees, warn_of_meters
+from kfcourse.symbolic.codegen import check_numbers
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
@@ -31,7 +32,6 @@ from kfcourse.symbolic.reading import (
     ModelError,
     Names,
     by_name,
-    exact_matrix,
     exact_number,
     formula_list,
     law,
@@ -40,8 +40,7 @@ from kfcourse.symbolic.reading import (
     shown,
     table,
 )
-from kfcourse.symbolic.sense import check_computable
-from kfcourse.symbolic.typesetting import with_index
+from kfcourse.symbolic.typesetting import aligned, with_index
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
 OF_A_VARIANT = ("title", "steps")  # keys of a variant's table that are not of its model
@@ -207,12 +206,10 @@ class Model:
 
     def _check(self) -> None:
         """ModelError if an equation cannot be computed with the parameters' values."""
-        for what, equation, noise, noise_law in (
-            ("state", self.state_equation, self.v, self.state_noise),
-            ("meter", self.meter_equation, self.w, self.meter_noise),
-        ):
-            means = dict(zip(noise, exact_matrix(noise_law.mean), strict=True))
-            check_computable(f"the {what} equation", equation, self.values, means)
+        for what, equation in (("state", self.state_equation), ("meter", self.meter_equation)):
+            for formula in equation:
+                place = f"the {what} equation, {formula!s:.100}, with these parameters"
+                check_numbers(place, sp.Matrix([formula.subs(self.values)]))
 
     @property
     def n(self) -> int:
@@ -298,18 +295,25 @@ class Model:
 
         Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
         """
+        return aligned(self.lines(values, indexed))
+
+    def lines(self, values: bool = True, indexed: bool = False) -> list[str]:
+        """The lines of `latex`."""
         x, v, w = (
             [sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in group]
             for group in (self.x, self.v, self.w)
         )
         at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
-        state, moves = [sp.latex(x) for x in self.x], self.between is not None
+        state = [sp.latex(x) for x in self.x]
         meter = ["y"] if self.p == 1 else [f"y_{{{i + 1}}}" for i in range(self.p)]
-        lines = [
-            rf"{rf'd{name}/dt' if moves else with_index(name, 'k+1')} &= "
-            rf"{formula_latex(formula.xreplace(at_k), x, v)}"
-            for name, formula in zip(state, self.state_equation, strict=True)
-        ]
+        lines = (
+            [
+                rf"{with_index(name, 'k+1')} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+                for name, formula in zip(state, self.state_equation, strict=True)
+            ]
+            if self.between is None
+            else self.between.latex(self.x)
+        )
         lines += [
             rf"{with_index(name, 'k')} &= {formula_latex(formula.xreplace(at_k), x, w)}"
             for name, formula in zip(meter, self.meter_equation, strict=True)
@@ -322,8 +326,8 @@ class Model:
             lines += [
                 rf"{sp.latex(name)} &= {number_latex(float(value))}"
                 for name, value in self.values.items()
-            ] + self.known.latex()
-        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+            ] + self.known.latex("t" if self.between is None else "t_{k}")
+        return lines
 
     def __repr__(self) -> str:
         return self._text

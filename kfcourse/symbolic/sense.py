@@ -1,19 +1,14 @@
-"""Whether numbers and laws make sense: sizes that floats can hold, variances that are any,
-something random to filter."""
+"""Whether laws make sense: variances that are any, something random to filter."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy as sp
-from sympy.core.relational import Relational
 
-from kfcourse.errors import ModelError
 from kfcourse.laws import Array
-from kfcourse.symbolic.codegen import check_numbers
-from kfcourse.symbolic.formula import UNDECIDED, undecided
 
 if TYPE_CHECKING:
     from kfcourse.symbolic.model import Model
@@ -27,42 +22,6 @@ def is_covariance(cov: Array) -> bool:
     correlations = cov * scale[:, None] * scale
     rounding = 1e-12 * len(cov)  # of eigvalsh, and of a covariance that was itself computed
     return bool((variances >= 0).all() and np.linalg.eigvalsh(correlations).min() >= -rounding)
-
-
-def check_computable(
-    what: str,
-    equation: sp.MatrixBase,
-    values: Mapping[sp.Symbol, sp.Expr],
-    noise_means: Mapping[sp.Symbol, sp.Expr],
-) -> None:
-    """ModelError if an equation with the parameters' values in it cannot be computed with."""
-    for formula in equation:
-        try:
-            problem = UNDECIDED if _has_undecided(formula, {**values, **noise_means}) else ""
-            if not problem:
-                numeric = formula.subs(values)
-                check_numbers(
-                    f"{what}, {formula!s:.100}, with these parameters", sp.Matrix([numeric])
-                )
-                numeric.subs(noise_means)  # as filters need it
-        except ModelError:
-            raise
-        except (TypeError, ValueError):  # SymPy's; the second of a step at a complex number
-            problem = "it compares what has no real value"
-        if problem:
-            raise ModelError(
-                f"{what}, {formula!s:.100}, with these parameters or where the noises are at their "
-                f"means: {problem}; change the parameters or write without the choice"
-            )
-
-
-def _has_undecided(formula: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool:
-    """Whether one of its conditions cannot be decided with these values; inner ones first, as an
-    outer one waits for them."""
-    return any(
-        undecided(condition.subs(values))
-        for condition in sorted(formula.atoms(Relational), key=sp.count_ops)
-    )
 
 
 def nothing_random(model: Model) -> str:

@@ -41,9 +41,12 @@ from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.typesetting import aligned
 from kfcourse.symbolic.writing import formula_lines
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
+# of what moves in continuous time: tau and Theta are these, integrated
+FUNCTION_LATEX |= {"tau_dot": r"\dot\tau", "A": "A", "Theta_dot": r"\dot\Theta", "p_dot": r"\dot p"}
 
 
 @dataclass(frozen=True)
@@ -90,11 +93,12 @@ class Structure:
         """The formula of "tau", "Theta", "h", "G", "F", "R", "A" or "Q": an expression if scalar,
         else a matrix."""
         formulas = self._derived()
-        matrix = (
-            getattr(formulas, function)
-            if function in ("R", "A", "Q")
-            else formulas.functions[function]
-        )
+        try:
+            matrix = formulas.functions.get(function) or getattr(formulas, function)
+        except (AttributeError, KeyError):
+            raise NoClosedForm(
+                f"there is no formula of {function!r}; derived are {', '.join(formulas.functions)}"
+            ) from None
         return matrix[0] if matrix.shape == (1, 1) else matrix
 
     def latex(self) -> str:
@@ -103,23 +107,26 @@ class Structure:
         formulas = self._derived()
         lines = []
         for name, matrix in formulas.functions.items():
-            before_state = name in ("tau", "Theta")
+            before_state = name not in ("h", "G", "F")
             arguments = formulas.state_arguments if before_state else formulas.meter_arguments
             names = (
                 ", ".join(sp.latex(a) for a in arguments)
                 if self.model.n == 1
                 else ("z, p" if before_state else "m, d")
             )
-            names += ", k" if self.model.timed else ""
+            if self.model.between is None:
+                names += ", k" if self.model.timed else ""
+            elif matrix.has(*self.model.known.symbols):
+                names += ", t"
             for i, j in cartesian(range(matrix.rows), range(matrix.cols)):
-                if name in ("Theta", "F") and i > j:
+                if name not in ("A", "G") and i > j and matrix.cols > 1:
                     continue  # symmetric
                 entry = f"{i + 1}" if matrix.cols == 1 else f"{i + 1}{j + 1}"
                 index = "" if len(matrix) == 1 else f"_{{{entry}}}"
                 value = f"{FUNCTION_LATEX[name]}{index}({names})"
                 first, *further = formula_lines(matrix[i, j], arguments, value)
                 lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]
-        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+        return aligned(lines)
 
     def source(self) -> str:
         """The generated NumPy code that runs."""
@@ -398,10 +405,10 @@ def _expanded(matrix: sp.ImmutableMatrix, **hints: bool) -> sp.ImmutableMatrix:
 
 def expect_each(structures: Sequence[Structure], what: str) -> None:
     """TypeError unless these are structural functions, a list of them."""
-    if isinstance(structures, Structure):
+    if isinstance(structures, Structure) or not structures:
         raise TypeError(
-            f"{what} expects a list of structures, one a mode, and one came: give "
-            f"[{structures.name}, ...]"
+            f"{what} expects a list of structures, one a mode, such as [linearised(mode) for mode "
+            "in model.modes]"
         )
     for structure in structures:
         expect(structure, Structure, what)

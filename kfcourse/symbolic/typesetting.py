@@ -88,6 +88,11 @@ def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
     return str((Printer if written else _Ordered)(settings).doprint(expression))
 
 
+def aligned(lines: Sequence[str]) -> str:
+    """A LaTeX `aligned` block."""
+    return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+
 def with_index(name: str, index: str) -> str:
     """LaTeX of a name with one more index: x_{1,k} for x_{1} and k."""
     own = re.fullmatch(r"(.*)_\{([^{}]*)\}", name)

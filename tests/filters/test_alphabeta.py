@@ -1,4 +1,4 @@
-"""Alpha-beta(-gamma) filters against the Riccati equation and plain floats."""
+"""The alpha-beta filter against the Riccati equation and plain floats."""
 
 import control
 import numpy as np
@@ -7,7 +7,6 @@ import pytest
 from kfcourse import Gaussian, Model, ModelError, run, simulate
 from kfcourse.filters.alphabeta import (
     alpha_beta,
-    alpha_beta_gamma,
     steady_alpha,
     steady_beta,
     tracking_index,
@@ -25,23 +24,17 @@ ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion
 
 
 @pytest.mark.parametrize("alpha", [0.01, 0.095, 0.5, 0.9, 0.99])
-@pytest.mark.parametrize("order", [1, 2])
-def test_the_coefficients_are_the_stationary_kalman_gain(alpha, order):
+def test_the_coefficients_are_the_stationary_kalman_gain(alpha):
     """python-control's solution of the Riccati equation."""
-    beta, gamma = steady_beta(alpha), steady_beta(alpha) ** 2 / alpha
-    index = tracking_index(alpha) if order == 1 else gamma / (2 * np.sqrt(1 - alpha))
     sigma = 30.0
-    model = kinematic(
-        T, dimensions=1, order=order, noise_sd=index * sigma / T**2, measurement_sd=sigma
-    )
+    noise_sd = tracking_index(alpha) * sigma / T**2
+    model = kinematic(T, dimensions=1, noise_sd=noise_sd, measurement_sd=sigma)
     system, _, _ = linear_system(model)
     predicted, _, _ = control.dare(system.A.T, system.H.T, system.Q, system.R)
     gain = predicted @ system.H.T / (system.H @ predicted @ system.H.T + system.R)
     # The Riccati equation loses digits where the noises differ much: alpha = 0.01 has an index of
     # 5e-5, squared 2.5e-9.
-    np.testing.assert_allclose(
-        gain[:, 0], np.array([alpha, beta / T, gamma / (2 * T**2)])[: order + 1], rtol=1e-6
-    )
+    np.testing.assert_allclose(gain[:, 0], [alpha, steady_beta(alpha) / T], rtol=1e-6)
 
 
 # --- the estimates
@@ -56,7 +49,7 @@ def planar(**changes):
     )
 
 
-def slow_alpha_beta(measurements, alpha, beta, growing):
+def slow_alpha_beta(measurements, alpha, beta):
     """One axis in plain floats: the first two measurements, at any distance, then the gains;
     coasting over NaN."""
     known, last, estimates, position, speed = 0, None, [], None, 0.0
@@ -70,26 +63,23 @@ def slow_alpha_beta(measurements, alpha, beta, growing):
                 position, speed = y, (y - last[1]) / (T * (k - last[0]))
             else:
                 innovation, count = y - position, known + 1
-                a = max(alpha, 2 * (2 * count - 1) / (count * (count + 1))) if growing else alpha
-                b = max(beta, 6 / (count * (count + 1))) if growing else beta
+                a = max(alpha, 2 * (2 * count - 1) / (count * (count + 1)))
+                b = max(beta, 6 / (count * (count + 1)))
                 position, speed = position + a * innovation, speed + b / T * innovation
             known, last = known + 1, (k, y)
         estimates.append((position, speed))
     return estimates
 
 
-@pytest.mark.parametrize("gains", ["growing", "constant", None])
-def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop(gains):
+def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop():
     model, alpha, beta = planar(prior={"variance": 1e4}), 0.3, 0.07
     y = simulate(model, 4, 20, seed=3).y
     y[1, 0] = y[5:8, 1] = y[0, 2] = y[1, 2] = np.nan  # gaps in the start and later, all components
     y[1, 3, 0] = y[6, 3, 1] = np.nan  # and one component alone
-    found = run(alpha_beta(model, alpha, beta, gains=gains), y).mean
+    found = run(alpha_beta(model, alpha, beta), y).mean
     for trajectory in range(4):
         for axis in range(2):
-            expected = slow_alpha_beta(
-                y[:, trajectory, axis], alpha, beta, growing=gains != "constant"
-            )
+            expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta)
             for k, values in enumerate(expected):
                 if values[0] is not None:  # nothing is known before the first measurement
                     np.testing.assert_allclose(
@@ -97,22 +87,14 @@ def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop(gains):
                     )
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
+def test_a_growing_memory_is_the_line_through_all_measurements():
     """Small coefficients leave the growing memory in force; NumPy's least squares."""
-    model = kinematic(T, dimensions=1, order=order, measurement_sd=5.0)
-    alpha = 1e-3
-    beta = steady_beta(alpha)
-    one = (
-        alpha_beta(model, alpha, beta)
-        if order == 1
-        else alpha_beta_gamma(model, alpha, beta, beta**2 / alpha)
-    )
+    model = kinematic(T, dimensions=1, measurement_sd=5.0)
     y = simulate(model, 1, 30, seed=8).y
-    found = run(one, y).mean[:, 0]
-    for k in range(order, 30):
-        line = np.polynomial.Polynomial.fit(T * np.arange(k + 1), y[: k + 1, 0, 0], order)
-        expected = [line(T * k), *(line.deriv(d)(T * k) for d in range(1, order + 1))]
+    found = run(alpha_beta(model, 1e-3, steady_beta(1e-3)), y).mean[:, 0]
+    for k in range(1, 30):
+        line = np.polynomial.Polynomial.fit(T * np.arange(k + 1), y[: k + 1, 0, 0], 1)
+        expected = [line(T * k), line.deriv()(T * k)]
         np.testing.assert_allclose(found[k], expected, rtol=1e-8, atol=1e-8)
 
 
@@ -149,8 +131,6 @@ def test_other_models_are_refused():
             r"order=1,",
         ):
             alpha_beta(model, 0.3, 0.1)
-    with pytest.raises(ModelError, match=r"velocity and acceleration on each axis.*order=2,"):
-        alpha_beta_gamma(kinematic(T, order=1), 0.5, 0.3, 0.1)
     shifted = Model.define(["x1 + x2", "x2 + v1"], "x1 + w1", state_noise={"mean": 1.0})
     with pytest.raises(ModelError, match="mean other than 0"):
         alpha_beta(shifted, 0.3, 0.1)

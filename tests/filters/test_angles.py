@@ -62,15 +62,15 @@ def test_components_are_named_in_a_list_or_by_x_and_y():
     assert angles("om") == ((1,), ()) and angles([]) == ((), ()) == angles(None)
     assert angles({"y": ["y2", "y1"]}) == ((), (0, 1))
     with pytest.raises(
-        ModelError, match=r"y is the name of a state and of a measurement.*angles=\{'y': \['y'\]\}"
+        ModelError, match=r"'y' is not the name of one component.*under the keys x and y"
     ):
         Model.define(["x", "y + v"], "x + w", symbols={"x": ["x", "y"]}, angles=["y"])
     assert Model.define(
         ["x", "y + v"], "x + w", symbols={"x": ["x", "y"]}, angles={"y": ["y"]}
     ).angles == ((), (0,))
     for given, message in (
-        (["y3"], "names y3; components are psi, om and y1, y2"),
-        ({"z": ["psi"]}, "keys x and y, not z"),
+        (["y3"], "'y3' is not the name of one component; name some of psi, om and y1, y2"),
+        ({"z": ["psi"]}, "'psi' is not the name of one component.*keys x and y"),
     ):
         with pytest.raises(ModelError, match=message):
             angles(given)

@@ -26,7 +26,6 @@ from kfcourse import (
 from kfcourse.filters import (
     EQUATIONS,
     adaptive,
-    alpha_beta,
     aof,
     dfkp,
     dfmp,
@@ -51,7 +50,6 @@ from kfcourse.filters import (
 from kfcourse.filters.alphabeta import steady_beta
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Instant
-from kfcourse.scenarios.radar import kinematic
 
 pytestmark = pytest.mark.quick
 
@@ -391,7 +389,6 @@ def test_structural_functions_in_the_place_of_a_model_are_told(build):
 
 
 SCALAR = linearised(Model.define("0.9*x + v", "x + w"))
-AXIS = kinematic(1.0, dimensions=1, noise_sd=0.1)
 NUMBERS = {  # what is called, with what: what the message says
     **{
         f"gate {p}": (lambda p=p: gated(aof(SCALAR), p), "probability must lie between")
@@ -417,12 +414,6 @@ NUMBERS = {  # what is called, with what: what the message says
         f"window {w}": (lambda w=w: adaptive(SCALAR, window=w), "window must be more than one")
         for w in (1, 0, float("nan"))
     },
-    "start": (lambda: alpha_beta(AXIS, 0.5, 0.2, start="here"), "start must be"),
-    "gains": (lambda: alpha_beta(AXIS, 0.5, 0.2, gains="shrinking"), "gains must be"),
-    "gains and start": (
-        lambda: alpha_beta(AXIS, 0.5, 0.2, start="prior", gains="growing"),
-        "gains must be",
-    ),
     **{
         f"alpha {a}": (lambda a=a: steady_beta(a), "lies between 0 and 1")
         for a in (0.0, 1.0, -0.1, np.nan)

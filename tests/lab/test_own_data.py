@@ -326,11 +326,3 @@ def test_a_finding_in_words():
     fits, not_so = (judged(Finding("neighbours of y2", value, -0.1, 0.1)) for value in (0.05, 0.3))
     assert "not so here" not in fits and "0.050 (a filter that is right has -0.100 to 0.100" in fits
     assert "y2: 0.300" in not_so and "claims more than it knows" in not_so
-
-
-def test_names_that_are_none_are_told(place):
-    variant = model_of(place / "my.toml", "line")
-    with pytest.raises(
-        ValueError, match=r"structure must be one of linearised, gaussian, .*, got 'extended'"
-    ):
-        estimate_record(place / "line.csv", variant, structure="extended")

@@ -70,7 +70,8 @@ def test_every_filter_with_results_is_drawn_in_its_own_style(results, ax, draw, 
     draw(result, ax)
     lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
     zero = "aof-exact" if result.has_bound else result.control
-    expected = [n for n in result.names if draw is not plots.relative_accuracy or n != zero]
+    left_out = {plots.relative_accuracy: zero, plots.consistency: "aof-exact"}.get(draw)
+    expected = [name for name in result.names if name != left_out]
     axis = [title(zero)] if draw is plots.relative_accuracy else []
     assert list(lines) == [title(name) for name in expected] + axis
     for name in expected:
@@ -122,8 +123,10 @@ def test_the_bands_are_confidence_intervals(results):
         low, high = result.gap(name).interval()
         np.testing.assert_allclose(band(ax, i), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
     assert len(ax.collections) == len(result.entrants) - 1  # the control is the axis
-    ax = plots.consistency(result, Figure().add_subplot(), ["duof"])
-    np.testing.assert_allclose(band(ax, 0), result.normalised_error("duof").interval(), rtol=1e-12)
+    ax = plots.consistency(result, Figure().add_subplot())
+    for i, name in enumerate(result.entrants):
+        interval = result.normalised_error(name).interval()
+        np.testing.assert_allclose(band(ax, i), interval, rtol=1e-12)
 
 
 def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):

@@ -14,11 +14,9 @@ from kfcourse.filters import aof
 from kfcourse.lab import Variant, report_text
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.report import FIGURES, LANGUAGES, WORDS, write_report
-from kfcourse.lab.report_plain import CATALOGUE
-from kfcourse.lab.report_sections import StudentReport
-from kfcourse.lab.report_text import cause, filled, inline_tex, ranges
+from kfcourse.lab.report_sections import CATALOGUE, StudentReport
+from kfcourse.lab.report_text import cause, filled, inline_tex, ranges, scalar_equations
 from kfcourse.lab.short_names import LAB, title
-from kfcourse.lab.written_out import scalar_equations
 from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.comparison import Verdict
 from kfcourse.montecarlo.designing import NotFinite, failed
@@ -417,10 +415,3 @@ def test_catalogue_numbers_are_the_courses():
 def test_runs_of_steps_are_joined():
     assert ranges([1, 3, 4, 5, 8], "${}$") == "$1$, $3$–$5$, $8$"
     assert ranges([2]) == "2"
-
-
-@pytest.mark.quick
-def test_an_unknown_language_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="en or ru"):
-        write_report(load_variants()["53"], None, tmp_path, "de")
-    assert list(tmp_path.iterdir()) == [] and LANGUAGES == ("en", "ru")

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from distributed import LocalCluster
 
-from kfcourse import compare, gaussian, load_variants
+from kfcourse import compare, gaussian
 from kfcourse.filters import aof, pointmass
-from kfcourse.lab.quality import examine_all
 from kfcourse.lab.short_names import LAB, lab_filters
 from kfcourse.montecarlo.parallel import cluster
 
@@ -46,11 +45,6 @@ def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, vari
         np.testing.assert_allclose(
             others, sums, rtol=1e-8 if name == "doubt" else 1e-12, err_msg=name
         )
-
-
-def test_checks_of_variants(address):
-    chosen = [load_variants()[name] for name in ("1", "2")]
-    assert list(examine_all(chosen, 2000, dask=address)) == list(examine_all(chosen, 2000, jobs=1))
 
 
 @pytest.mark.parametrize("wrong", ["nonsense", "tcp://scheduler", "nobody.invalid:8786"])

@@ -1,14 +1,16 @@
 """Scores of predictions: a slow loop, closed forms of a linear model, and that honesty pays."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy
 
 from kfcourse import Model, compare, gaussian, linearised
-from kfcourse.filters import aof, duof, imm, kalman_filter, pointmass
+from kfcourse.filters import aof, duof, gpb2, imm, kalman_filter, pointmass
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.experiment import Sample, batch_sizes, states
-from kfcourse.montecarlo.scores import crps_of_normal
+from kfcourse.montecarlo.scores import crps, scored
 from kfcourse.symbolic.jumping import JumpModel
 
 pytestmark = pytest.mark.quick
@@ -19,19 +21,40 @@ def linear(**changes):
     return Model.define("0.9*x + 0.6*v", "1.5*x + w", **settings)
 
 
-def by_quadrature(y, mean, deviation):
-    """Integral of (P - [. >= y])^2."""
-    law = scipy.stats.norm(mean, deviation)
-    below = scipy.integrate.quad(lambda u: law.cdf(u) ** 2, -np.inf, y)[0]
-    return below + scipy.integrate.quad(lambda u: law.sf(u) ** 2, y, np.inf)[0]
+def by_quadrature(y, means, deviations, weights=(1.0,)):
+    """Integral of (P - [. >= y])^2 for a mixture, in pieces between all the places of note."""
+    laws = [*zip(weights, np.atleast_1d(means), np.atleast_1d(deviations), strict=True)]
+
+    def square(u):
+        return (sum(w * scipy.stats.norm(m, d).cdf(u) for w, m, d in laws) - (u >= y)) ** 2
+
+    edges = sorted([y, *(m + k * d for _, m, d in laws for k in (-9, 0, 9))])
+    return sum(
+        scipy.integrate.quad(square, a, b, limit=200)[0] for a, b in pairwise(edges) if a < b
+    )
 
 
 def test_crps_is_the_integral():
+    one = np.ones((1, 1))
     for y, mean, deviation in ((0.3, 0.0, 1.0), (-4.0, 1.0, 0.5), (2.0, 2.0, 3.0)):
-        ours = crps_of_normal(np.array([y - mean]), np.array([deviation]))
+        ours = crps(np.array([[y - mean]]), np.array([[deviation]]), one)
         assert ours.item() == pytest.approx(by_quadrature(y, mean, deviation), rel=1e-7)
-    sure = crps_of_normal(np.array([-1.5, 0.0]), np.zeros(2))
+    sure = crps(np.array([[-1.5], [0.0]]), np.zeros((2, 1)), one)
     np.testing.assert_array_equal(sure, [1.5, 0.0])
+
+
+def test_crps_of_a_mixture_is_the_integral():
+    """Two hills, three with the middle one sharp, and a point beside a law."""
+    for y, means, deviations, weights in (
+        (0.3, [-2.0, 1.5], [1.0, 0.4], [0.3, 0.7]),
+        (1.2, [0.0, 1.0, 5.0], [2.0, 0.05, 1.0], [0.5, 0.2, 0.3]),
+        (-7.0, [0.0, 4.0], [1.0, 1.0], [0.9, 0.1]),
+    ):
+        ours = crps(*(np.array([row]) for row in (y - np.array(means), deviations, weights)))
+        assert ours.item() == pytest.approx(by_quadrature(y, means, deviations, weights), rel=1e-6)
+    point = crps(np.array([[0.0, 1.0]]), np.zeros((1, 2)), np.array([[0.5, 0.5]]))
+    # P steps by a half at y and one below it: (1/2)^2 over a length of 1
+    np.testing.assert_allclose(point, 0.25, rtol=1e-15)
 
 
 def test_a_slow_loop():
@@ -130,6 +153,48 @@ def test_modes_are_judged_by_their_mixture():
     compared = compare(filters, model, 1000, 4, seed=3, scores=structures[0])
     more = compared.log_score("imm", minus="aof-linearised", steps=slice(None))
     assert more.value > 4 * more.standard_error
+    less = compared.crps("imm", minus="aof-linearised", steps=slice(None))
+    assert less.value < -4 * less.standard_error
+
+
+@pytest.mark.parametrize("build", [imm, gpb2])
+def test_the_mixture_of_a_filter_with_modes(build):
+    """Two correlated meters in two modes, one trajectory in sixty-six by quadrature: weights and
+    laws are those of the state before the measurement."""
+    model = JumpModel.define(
+        "a*x + 0.6*v",
+        ["x + g*w1", "x**2 + w2"],
+        {"a": 0.9, "g": 0.5},
+        meter_noise={"variance": [[0.3, 0.1], [0.1, 0.2]]},
+        modes={"good": {}, "bad": {"parameters": {"g": 6, "a": -0.5}}},
+        transition=[[0.8, 0.2], [0.4, 0.6]],
+        first=[0.7, 0.3],
+    )
+    structures = [linearised(mode) for mode in model.modes]
+    chosen = build(structures, model, model.first)
+    y = np.random.default_rng(2).standard_normal((3, 1, 2))
+    before = states(chosen, y)
+    for k, now in enumerate(y):
+        memory = before[k].memory
+        laws = [structures[i % 2].at(k).measure(*law) for i, law in enumerate(memory.predicted)]
+        F = [np.broadcast_to(law.F, (1, 2, 2))[0] for law in laws]
+        weights = memory.expected[0]
+        assert len(weights) == len(laws) and weights.sum() == pytest.approx(1)
+        wanted = sum(
+            by_quadrature(
+                now[0, i], [law.h[0, i] for law in laws], [np.sqrt(f[i, i]) for f in F], weights
+            )
+            for i in (0, 1)
+        )
+        log = np.log(
+            sum(
+                w * scipy.stats.multivariate_normal(law.h[0], f).pdf(now[0])
+                for w, law, f in zip(weights, laws, F, strict=True)
+            )
+        )
+        ours = scored(chosen, structures[0], before[k], now, before[k + 1])
+        assert ours[0].item() == pytest.approx(log, rel=1e-10)
+        assert ours[1].item() == pytest.approx(wanted, rel=1e-6)
 
 
 def test_not_asked_for():

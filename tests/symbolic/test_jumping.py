@@ -37,8 +37,6 @@ def test_a_mode_is_a_model_of_what_holds_for_all_and_of_what_differs():
     assert model.modes[1] == Model.define("c*x + 3 + v", "x + C*w", {"c": 0.5, "C": 7})
     assert model.modes[1].state_noise.cov == 4 and model.prior.mean == 2
     assert (model.n, model.p, model.names) == (1, 1, ("a", "b"))
-    changed = model.replace(c=0.25)
-    assert [float(mode.parameters["c"]) for mode in changed.modes] == [0.25, 0.25]
 
 
 def test_a_single_row_is_a_mode_drawn_anew_at_each_step():
@@ -132,13 +130,16 @@ def test_averaged_equations():
     [
         (
             {"transition": [[0.9, 0.2], [0.3, 0.7]]},
-            "`transition` at step 0: row 1 sums to 1.1, not to 1",
+            r"`transition` at step 0: \[0.9, 0.2\] are no probabilities",
         ),
-        ({"transition": [[0.9, 0.1], [1.3, -0.3]]}, "row 2 has an entry that is no probability"),
-        ({"transition": [[0.9, "0.1*k"], [0.3, 0.7]]}, "`transition` at step 0: row 1 sums to 0.9"),
+        ({"transition": [[0.9, 0.1], [1.3, -0.3]]}, r"\[1.3, -0.3\] are no probabilities"),
+        (
+            {"transition": [[0.9, "0.1*k"], [0.3, 0.7]]},
+            r"step 0: \[0.9, 0.0\] are no probabilities",
+        ),
         (
             {"transition": [["1 - sqrt(k - 3)", "sqrt(k - 3)"], [0.3, 0.7]]},
-            "at step 0: row 1 has an entry that is no",
+            r"at step 0: \[nan, nan\] are no probabilities",
         ),
         ({"transition": [[1.0]]}, "must be 2 rows of 2 probabilities for 2 mode"),
         ({"transition": "0.9"}, "must be 2 rows of 2 probabilities"),
@@ -147,7 +148,7 @@ def test_averaged_equations():
             {"transition": [[0.9, True], [0.3, 0.7]]},
             "^`transition`: an entry = True: expected a finite number",
         ),
-        ({"first": [0.8, 0.3]}, "`first`: the row sums to 1.1"),
+        ({"first": [0.8, 0.3]}, r"`first`: \[0.8, 0.3\] are no probabilities"),
         ({"first": [1.0]}, "`first` must be 2 probabilities"),
         ({"first": "often"}, "`first` must be 2 probabilities"),
         ({"first": None}, r"`first` must be 2 probabilities.*; got None"),
@@ -177,7 +178,7 @@ def test_averaged_equations():
         ),
         (
             {"modes": {"sound": MODES["sound"], "odd": {"meter": "x + w1 + w2"}}},
-            r"as many noise.*name noises by `symbols`",
+            r"components or noises; name noises by `symbols`",
         ),
         (
             {
@@ -211,7 +212,7 @@ def test_names_of_modes_are_set_as_text():
 def test_a_chain_that_fails_late_says_so_when_it_comes_there():
     model = define(transition=[["1 - k/90", "k/90"], [0.3, 0.7]])
     assert model.transition_at(90).shape == (2, 2)
-    with pytest.raises(ModelError, match=r"at step 91.*run at most 91 steps"):
+    with pytest.raises(ModelError, match=r"at step 91: \[-0.01.*\] are no probabilities"):
         model.transition_at(91)
 
 
@@ -242,7 +243,7 @@ def test_what_has_no_average_over_the_modes():
             average(model.modes[0])
     with pytest.raises(ValueError, match="a structure for each of the 2 modes, got 1"):
         averaged(model, structures[:1])
-    with pytest.raises(TypeError, match="list of structures, one a mode, and one came"):
+    with pytest.raises(TypeError, match="list of structures, one a mode, such as"):
         averaged(model, structures[0])
     with pytest.raises(TypeError, match="averaged expects a Structure, got Model"):
         averaged(model, model.modes)
