@@ -305,8 +305,8 @@ def calls(code: str, *names: str) -> Iterator[ast.Call]:
 
 def _printed(code: str) -> Iterator[Formula]:
     for call in calls(code, "verified", "typeset"):
-        for sides in (argument for argument in call.args if isinstance(argument, ast.Tuple)):
-            yield from (Formula("side", text) for text in _texts(sides.elts))
+        for sides in (node for side in call.args for node in ast.walk(side)):
+            yield from (Formula("side", text) for text in _texts(getattr(sides, "elts", ())))
         for keyword in call.keywords:
             if keyword.arg == "names" and isinstance(keyword.value, ast.Dict):
                 yield from (Formula("name", text) for text in _texts(keyword.value.values))

@@ -180,7 +180,7 @@ LETTERS = (
 SAID = {
     DEFINITION: [r"v_k\sim\mathcal N(0,\sigma_a^2)", r"w_k\sim\mathcal N(0,\sigma^2)"],
     "quoted from the radar paper": [r"K=[\alpha,\beta/T]^T"],
-    NOTATION: ["0", r"E(\zeta)"],
+    NOTATION: [r"E(\zeta)"],
     CONDITION: [r"|\zeta|=1"],
 }
 EQUALS = {

@@ -22,15 +22,12 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.symbolic.typesetting import Equation, Side, equation_latex, side_lines
+from kfcourse.symbolic.typesetting import Equation, Side, equation_latex
 from kfcourse.symbolic.writing import by_thousands, number_latex
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
 DEFINITION = "definition"
-BOTH = r"\text{both sides}"  # of an identity, where nothing else would stand before a bare "0"
-BY_IDENTITY = "identity, by SymPy"
 _SEED = 53
-_GUARD = 15  # further digits with which numbers are computed
 
 
 class Unverified(AssertionError):
@@ -65,8 +62,9 @@ def verified(
     *equations : (left, right, ...)
         Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is
         printed and not checked, so at least two others are needed then.  Where all sides print
-        alike a string before them says what they are; without it "both sides" stands there.
-        `sympy.Eq` is taken too, unless SymPy has already made it true or false.
+        alike a string before them must say what they are.  `sympy.Eq` is taken too, unless SymPy
+        has already made it true or false.  A function that returns the equations, `lambda: [(p,
+        Psi - K*S*Psi)]`, has its terms and factors printed in the order in which they stand there.
     where : mapping of symbols to expressions
         What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference
         is taken, as often as it takes.
@@ -89,7 +87,7 @@ def verified(
     """
     if not equations:
         raise ValueError("verified() needs an equation: verified((left, right))")
-    given = [_sides(equation) for equation in equations]
+    given = _given(equations)
     for sides in given:
         expressions = [sp.sympify(side) for side in sides if not isinstance(side, str)]
         if len(expressions) < 2:
@@ -97,31 +95,23 @@ def verified(
                 f"nothing to verify in {sides}: two sides that are not strings are needed; to "
                 f"print a definition, typeset()"
             )
+        if "&=" not in equation_latex(sides, names):
+            raise ValueError(
+                f"the sides of {sides} are printed alike: say what both sides are, in a string "
+                f"before them"
+            )
         for left, right in pairwise(expressions):
             if digits is None:
                 _must_vanish(left, right, where or {})
             else:
                 _must_agree(left, right, where or {}, digits, at)
     evidence = (
-        BY_IDENTITY
+        "identity, by SymPy"
         if digits is None
         else f"to {digits} digits, at {3 if at is None else len(at)} points"
     )
     mark = f"{evidence}; {how}" if how else evidence
-    told = [
-        (BOTH, *sides)
-        if len({str(side_lines(side, names=names)) for side in sides}) == 1
-        else sides
-        for sides in given
-    ]
-    if any(sides[0] == BOTH and not any(sp.flatten([sides[1]])) for sides in told):
-        raise ValueError(
-            "0 = 0 says nothing: give the sides whose difference it is, or a string that says "
-            "what vanishes"
-        )
-    body = _display(told, label, names)
-    record = {"label": label, "latex": _block(told, names), "how": mark, "equations": len(given)}
-    return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)
+    return _shown(given, names, f'verified">✓ {mark}', label=label, how=mark, equations=len(given))
 
 
 def typeset(
@@ -132,9 +122,8 @@ def typeset(
 ) -> Shown:
     """Equations that are not verified, printed as `verified` prints them; under them stands what
     they are."""
-    given = [_sides(equation) for equation in equations]
-    record = {"label": label, "latex": _block(given, names), "how": what, "equations": 0}
-    return Shown(f'{_display(given, label, names)}\n\n<p class="kf-said">{what}</p>', record)
+    given = _given(equations)
+    return _shown(given, names, f'said">{what}', label=label, how=what, equations=0)
 
 
 def claim(sentence: str, *conditions: Any) -> Shown:
@@ -150,8 +139,9 @@ def claim(sentence: str, *conditions: Any) -> Shown:
         raise ValueError("claim() needs a condition besides its sentence")
     for number, condition in enumerate(conditions, start=1):
         if not np.all(condition):
-            which = f" (condition {number} of {len(conditions)})" if len(conditions) > 1 else ""
-            raise Unverified(f"this does not hold{which}: {sentence}")
+            raise Unverified(
+                f"this does not hold (condition {number} of {len(conditions)}): {sentence}"
+            )
     return _holds(sentence)
 
 
@@ -169,7 +159,7 @@ def agree(
         If they do not, or are not finite, or have different shapes: the sentence, and the largest
         difference.
     """
-    computed, expected = np.asarray(computed, dtype=float), np.asarray(expected, dtype=float)
+    computed, expected = np.asarray(computed, float), np.asarray(expected, float)
     if computed.shape != expected.shape and 1 not in (computed.size, expected.size):
         raise Unverified(
             f"arrays of shapes {computed.shape} and {expected.shape} are compared: {sentence}"
@@ -186,20 +176,40 @@ _NO_WORDS = re.compile(r"(\$[^$]*\$|`[^`]*`)")  # formulas and code in a sentenc
 _POWER_OF_TEN = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+(?!\w)")
 
 
-def _typeset(number: re.Match[str]) -> str:
-    return f"${number_latex(float(number[0]))}$"
-
-
 def _holds(sentence: str) -> Shown:
     # as the book writes it; Python's format leaves no space
     sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)
     parts = _NO_WORDS.split(sentence)
     parts[::2] = (
-        by_thousands(_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text))) for text in parts[::2]
+        by_thousands(
+            _POWER_OF_TEN.sub(
+                lambda number: f"${number_latex(float(number[0]))}$", _MINUS.sub("−", text)
+            )
+        )
+        for text in parts[::2]
     )
     sentence = "".join(parts)
     return Shown(
         f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0}
+    )
+
+
+def _given(equations: Sequence[Any]) -> list[tuple[Side, ...]]:
+    if not callable(equations[0]):
+        return [_sides(equation) for equation in equations]
+    with sp.evaluate(False):
+        return [tuple(map(_as_written, sides)) for sides in equations[0]()]
+
+
+def _as_written(side: Side) -> Side:
+    """Sums of sums are sums, and so are products."""
+    if isinstance(side, str):
+        return side
+    return sp.UnevaluatedExpr(
+        side.replace(
+            lambda part: part.func in (sp.Add, sp.Mul),
+            lambda part: part.func(*sum(map(part.func.make_args, part.args), ())),
+        )
     )
 
 
@@ -233,17 +243,16 @@ def _must_agree(
     at: Sequence[Mapping[Any, float]] | None,
 ) -> None:
     left, right = _substituted(left, where), _substituted(right, where)
+    unit = sp.Float(10) ** -digits
     free = sorted((left.free_symbols | right.free_symbols), key=str)
     for point in _points(free) if at is None else at:
-        one, other = (sp.N(side.subs(point).doit(), digits + _GUARD) for side in (left, right))
+        one, other = (sp.N(side.subs(point).doit(), digits + 15) for side in (left, right))
         if not (one.is_number and other.is_number):
             raise ValueError(
                 f"at {point} no number is left but {one} and {other}: `at` gives every symbol a "
                 f"value"
             )
-        if not abs(one - other) <= sp.Float(10) ** -digits * max(
-            abs(one), abs(other), sp.Float(10) ** -digits
-        ):
+        if not abs(one - other) <= unit * max(abs(one), abs(other), unit):
             numbers = f"the left side is {sp.N(one, digits)}, the right {sp.N(other, digits)}"
             raise Unverified(f"at {point} {numbers}\n  left:  {left}\n  right: {right}")
 
@@ -309,12 +318,10 @@ def _points(symbols: Sequence[sp.Symbol]) -> list[dict[sp.Symbol, sp.Rational]]:
     ]
 
 
-def _block(equations: Sequence[Equation], names: Mapping[Any, str] | None) -> str:
-    lines = " \\\\[3pt]\n".join(equation_latex(sides, names=names) for sides in equations)
-    return f"\\begin{{aligned}}\n{lines}\n\\end{{aligned}}"
-
-
-def _display(
-    equations: Sequence[Equation], label: str | None, names: Mapping[Any, str] | None
-) -> str:
-    return f"$$\n{_block(equations, names)}\n$$" + (f" ({label})" if label else "")
+def _shown(
+    given: Sequence[Equation], names: Mapping[Any, str] | None, below: str, **record: Any
+) -> Shown:
+    lines = " \\\\[3pt]\n".join(equation_latex(sides, names=names) for sides in given)
+    block = f"\\begin{{aligned}}\n{lines}\n\\end{{aligned}}"
+    number = f" ({label})" if (label := record["label"]) else ""
+    return Shown(f'$$\n{block}\n$${number}\n\n<p class="kf-{below}</p>', record | {"latex": block})

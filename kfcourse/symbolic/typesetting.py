@@ -18,28 +18,12 @@ Equation: TypeAlias = Sequence[Side]
 WIDTH = 62  # symbols in a line of the page's column
 
 _OPERATORS = {"+", "-", "=", r"\cdot", r"\approx", r"\le", r"\ge"}  # with the space around them
-_TOKEN = re.compile(r"\\[a-zA-Z]+|\\.|.", re.DOTALL)
+_TOKEN = re.compile(r"(?s)\\[a-zA-Z]+|\\.|.")
 _NAME_BEFORE_A_FACTOR = re.compile(
     r"(\\mathit\{[A-Za-z]+\}(?:\^\{[^{}]*\})?) (?!\\(?:right|cdot)\b)(?=[A-Za-z\\{])"
 )
 _WORD_BELOW = re.compile(r"_\{([a-z]{4,})(?=[ }])")  # G_{best}: a word, no product of letters
-_WITHOUT_WIDTH = {
-    r"\left",
-    r"\right",
-    r"\,",
-    r"\!",
-    "{",
-    "}",
-    "^",
-    "_",
-    "&",
-    " ",
-    r"\mathrm",
-    r"\mathit",
-    r"\operatorname",
-    r"\tilde",
-    r"\hat",
-}
+_WITHOUT_WIDTH = re.compile(r"\\(?:left|right|mathrm|mathit|operatorname|tilde|hat|[,!])|[{}^_& ]")
 
 
 def equation_latex(equation: Equation, names: Mapping[Any, str] | None = None) -> str:
@@ -91,14 +75,17 @@ def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
 
 def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
     """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around
-    derivatives."""
+    derivatives; of an `UnevaluatedExpr` with its terms and factors in the order in which they
+    stand."""
+    written = isinstance(expression, sp.UnevaluatedExpr)
     settings = {
         "symbol_names": dict(names or {}),
         "diff_operator": "d",
         "mat_delim": "(",
         "fold_short_frac": False,
+        "order": "none" if written else None,
     }
-    return str(_Ordered(settings).doprint(expression))
+    return str((Printer if written else _Ordered)(settings).doprint(expression))
 
 
 def aligned(lines: Sequence[str]) -> str:
@@ -178,7 +165,7 @@ def symbols(latex: str) -> float:
 
 
 def _width(flat: str) -> float:
-    tokens = [token for token in _TOKEN.findall(flat) if token not in _WITHOUT_WIDTH]
+    tokens = [token for token in _TOKEN.findall(flat) if not _WITHOUT_WIDTH.fullmatch(token)]
     return len(tokens) + 1.2 * sum(token in _OPERATORS for token in tokens)
 
 

@@ -61,8 +61,8 @@ CHANGES = {
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
     "models-that-jump": ("(dx, (vx * sin - vy", "(dx, (vx * sin + vy"),
     "wiener": (
-        "past = Q / (1 - a * gam) / (1 - a / zeta)",
-        "past = Q / (1 - a * gam) / (1 + a / zeta)",
+        "subs(zeta, a) / (1 - a / zeta)",
+        "subs(zeta, a) / (1 + a / zeta)",
     ),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
     "literature": ("sp.Matrix([[sp.cos(angle), 0]])", "sp.Matrix([[-sp.cos(angle), 0]])"),
