@@ -219,13 +219,13 @@ def diffusion_rows(diffusion: Any) -> list[list[Formula]]:
             f"`diffusion` must be one formula or a list of rows such as [['0'], ['s']], got "
             f"{diffusion!r}"
         )
-    found = [formula_list("diffusion", list(row)) for row in rows]
-    if len({len(row) for row in found}) > 1:
+    lists = [formula_list("diffusion", list(row)) for row in rows]
+    if len({len(row) for row in lists}) > 1:
         raise ModelError(
-            f"`diffusion`: rows of different lengths {[len(row) for row in found]}; write 0 where "
+            f"`diffusion`: rows of different lengths {[len(row) for row in lists]}; write 0 where "
             f"a noise does not enter"
         )
-    return found
+    return lists
 
 
 def to_discrete(model: ContinuousModel, step: float) -> Model:

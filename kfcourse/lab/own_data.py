@@ -247,7 +247,7 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
 def write_numbers(result: Analysis, path: Path) -> None:
     """The CSV file: a row for each row of the record; cells without a number are empty."""
     model, examined = result.record.model, result.examined
-    nu = examined.found
+    nu = examined.innovations
     columns = {}
     for i, symbol in enumerate(model.x):
         for key, law in (("", examined.estimate), ("_smoothed", examined.smoothed)):
@@ -304,7 +304,7 @@ def _track(result: Analysis, places: Sequence[int], ax: Axes) -> None:
 
 def _innovations(result: Analysis, i: int, ax: Axes) -> None:
     """Innovations of a component of the meter, and what was expected of them."""
-    times, nu = result.record.times, result.examined.found
+    times, nu = result.record.times, result.examined.innovations
     value, two, passed = nu.value[:, 0, i], 2 * _deviation(nu.cov, i), result.examined.passed
     measured = ~np.isnan(value)
     refused = measured & ~passed[:, 0, i]
@@ -320,7 +320,7 @@ def _innovations(result: Analysis, i: int, ax: Axes) -> None:
 def _whiteness(result: Analysis, i: int, ax: Axes) -> None:
     """Autocorrelation of the innovations that were taken, from each to the next ones; nothing of
     fewer than three."""
-    used, nu = result.examined.passed[:, 0, i], result.examined.found
+    used, nu = result.examined.passed[:, 0, i], result.examined.innovations
     if used.sum() >= 3:
         value, F = nu.value[used][..., [i]], nu.cov[used][..., [i], :][..., [i]]
         # as for `findings`: a wrong size alone is no correlation

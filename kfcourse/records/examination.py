@@ -45,7 +45,7 @@ class Examination(NamedTuple):
     estimate, smoothed : Gaussian
         Means (steps, runs, n) and covariances (steps, runs, n, n): at each step, and given the
         whole record.
-    found : Innovations
+    innovations : Innovations
         nu (steps, runs, p), NaN where nothing was measured, and F (steps, runs, p, p).
     weight : ndarray (steps, runs)
         How much each measurement counted: 1 in full, 0 refused, NaN where there was none.
@@ -60,7 +60,7 @@ class Examination(NamedTuple):
 
     estimate: Gaussian
     smoothed: Gaussian
-    found: Innovations
+    innovations: Innovations
     weight: Array
     passed: Array
     log_likelihood: Array
@@ -195,8 +195,8 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
     if not used.any():
         return []
     value, F = (
-        np.where(examined.passed[used, run], examined.found.value[used, run], np.nan),
-        examined.found.cov[used, run],
+        np.where(examined.passed[used, run], examined.innovations.value[used, run], np.nan),
+        examined.innovations.cov[used, run],
     )
     degrees = (~np.isnan(value)).sum(axis=-1)
     if examined.by_component:

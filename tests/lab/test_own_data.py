@@ -143,8 +143,8 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         ("time", times[:60]),
         ("z", told.examined.estimate.mean[:, 0, 1]),
         ("u_smoothed_sd", np.sqrt(told.examined.smoothed.cov[:, 0, 2, 2])),
-        ("y2_innovation", told.examined.found.value[:, 0, 1]),
-        ("y1_innovation_sd", np.sqrt(told.examined.found.cov[:, 0, 0, 0])),
+        ("y2_innovation", told.examined.innovations.value[:, 0, 1]),
+        ("y1_innovation_sd", np.sqrt(told.examined.innovations.cov[:, 0, 0, 0])),
         ("weight", told.examined.weight[:, 0]),
         ("log_likelihood", told.examined.log_likelihood[:, 0]),
     ):

@@ -25,8 +25,8 @@ def test_the_parts_are_those_of_the_package():
     for ours, theirs in (
         (told.estimate.mean, run(one, y).mean),
         (told.smoothed.cov, smooth(one, y).cov),
-        (told.found.value, found.value),
-        (told.found.cov, np.broadcast_to(found.cov, told.found.cov.shape)),
+        (told.innovations.value, found.value),
+        (told.innovations.cov, np.broadcast_to(found.cov, told.innovations.cov.shape)),
         (told.log_likelihood, likelihood(one, y)),
     ):
         np.testing.assert_array_equal(ours, theirs)
