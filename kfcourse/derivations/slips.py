@@ -42,6 +42,7 @@ from kfcourse.derivations.terms import (
     replaced,
     total,
     walk,
+    written,
 )
 from kfcourse.derivations.values import ENTIRE, Uncomputed, Values
 from kfcourse.laws import Array
@@ -329,12 +330,17 @@ class _Search:
         """Wrong and right moments of the normal law, and their order; of functions, too."""
         law = self.setting.law
         at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
+        products: dict[str, list[Node]] = {}
         for _, node in [*walk(self.line), *walk(self.above)]:
             if node.kind == CALL and node.data in ENTIRE and letters(node) & set(law.states):
                 there = replaced(node, at_mean)
                 yield there, mean(node), 0
                 yield power(there, 2), mean(power(node, 2)), 0
-            factors = self._factors(node)
+            if node.kind == MEAN:
+                (inside,) = node.parts
+                for term in inside.parts if inside.kind == SUM else (inside,):
+                    products[written(term)] = self._factors(term)
+        for factors in products.values():
             for i in range(1, len(factors)):
                 apart = (mean(product(*part)) for part in (factors[:i], factors[i:]))
                 yield product(*apart), mean(product(*factors)), 0

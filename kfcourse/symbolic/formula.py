@@ -105,6 +105,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         expression = Reader(formula, symbols, offset).read(tree)
     except RecursionError:
         raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
+    except TypeError:  # SymPy's, where numbers that are not real are compared
+        raise FormulaError(formula, "the formula compares what has no real value") from None
     if _degree(expression) > MAX_DEGREE:
         raise FormulaError(
             formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it"

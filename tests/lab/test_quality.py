@@ -426,6 +426,7 @@ def test_what_is_generated_is_read_back_and_well_posed_with_another_seed(generat
     assert sum(generated.rejected.values()) > 0
 
 
+@pytest.mark.slow
 def test_the_same_seed_generates_the_same_text_whatever_the_processes(generated):
     again = generate(2, seed=6, runs=1000, jobs=2, ask=unposed)
     assert again.toml() == generated.toml()

@@ -194,7 +194,7 @@ BAD_VARIANTS = {
         GOOD.replace("x + w", "x + u + w") + 'inputs = { u = ["1", "2"] }',
         "the input u must be a list",
     ),
-    "angles 3": (GOOD + "angles = 3", "`angles` must name components"),
+    "angles 3": (GOOD + "angles = 3", "`angles`: 3 is not the name of one component"),
     "ten thousand hexadecimal digits": (
         GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}",
         "numbers of thousands of digits",

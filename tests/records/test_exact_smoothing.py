@@ -166,6 +166,7 @@ def plane() -> Model:
     return Model.define(["x1 + 0.3*x2 + 0.1*v1", "0.9*x2 + 0.3*v2 + 0.1*v1"], ["x1 + 0.5*w"])
 
 
+@pytest.mark.slow
 def test_particles_look_back_as_well_as_they_say(plane):
     y = simulate(plane, 60, 10, seed=1).y.copy()
     y[4, :9] = np.nan

@@ -703,16 +703,21 @@
 
     // wrong and right moments of the normal law, and their order; of functions, too
     moments() {
-      const found = [], { states, means, cov } = this.setting, atMean = Object.fromEntries(states.map((x, i) => [x, letter(means[i])]));
+      const found = [], products = new Map(), { states, means, cov } = this.setting, atMean = Object.fromEntries(states.map((x, i) => [x, letter(means[i])]));
       for (const [, call] of [...walk(this.line), ...walk(this.above)]) {
-        const factors = this.factors(call);
-        for (let i = 1; i < factors.length; i++) {
-          const apart = [factors.slice(0, i), factors.slice(i)].map((some) => mean(product(some)));
-          found.push([product(apart), mean(product(factors)), 0]);
+        if (call.kind === "mean") {
+          const [inside] = call.parts;
+          for (const term of inside.kind === "sum" ? inside.parts : [inside]) products.set(JSON.stringify(term, (key, value) => (key === "span" ? undefined : value)), this.factors(term));
         }
         if (call.kind !== "call" || !ENTIRE.includes(call.data) || !states.some((x) => letters(call).has(x))) continue;
         const there = replaced(call, atMean);
         found.push([there, mean(call), 0], [power(there, 2), mean(power(call, 2)), 0]);
+      }
+      for (const factors of products.values()) {
+        for (let i = 1; i < factors.length; i++) {
+          const apart = [factors.slice(0, i), factors.slice(i)].map((some) => mean(product(some)));
+          found.push([product(apart), mean(product(factors)), 0]);
+        }
       }
       states.forEach((x, i) => {
         const m = letter(means[i]), d = letter(cov[i][i]), moment = mean(power(letter(x), 2));
