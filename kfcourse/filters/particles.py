@@ -129,7 +129,8 @@ def particle(
     Parameters
     ----------
     model : Model or JumpModel
-        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly.
+        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly, or can be
+        solved for.
     particles : int
         Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells
         how many count.

@@ -209,7 +209,10 @@ class Model:
         for what, equation in (("state", self.state_equation), ("meter", self.meter_equation)):
             for formula in equation:
                 place = f"the {what} equation, {formula!s:.100}, with these parameters"
-                check_numbers(place, sp.Matrix([formula.subs(self.values)]))
+                try:
+                    check_numbers(place, sp.Matrix([formula.subs(self.values)]))
+                except TypeError:  # SymPy's
+                    raise ModelError(f"{place}: it compares what has no real value") from None
 
     @property
     def n(self) -> int:

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from kfcourse.angles import difference, moments_on_circle, wrapped
 from kfcourse.filters import (
@@ -17,6 +18,7 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
+from kfcourse.filters.densities import likelihood
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees
 from kfcourse.montecarlo.designing import design
@@ -272,6 +274,17 @@ def test_what_a_filter_remembers_of_a_measured_angle_is_its_innovation():
 
 
 # ---------------------------------------------------------------- densities on the circle
+
+
+def test_the_likelihood_of_a_measured_angle_is_wound_around_the_circle():
+    """Noise of 2 rad: the densities of y and of y plus whole turns add up; of a component that is
+    none they do not, and what is missing counts in no turn."""
+    model = Model.define(["x1 + 0.1*v1", "x2 + v2"], ["x1 + 2*w1", "x2 + w2"], angles={"y": ["y1"]})
+    x, turns = np.array([[-3.0, 1.0], [0.5, 4.0], [40.0, 2.0]]), 2 * PI * np.arange(-30, 31)
+    angle = norm.pdf(3.0 - x[:, :1] + turns, scale=2.0).sum(axis=1)
+    for y, other in ((2.5, norm.pdf(2.5 - x[:, 1])), (np.nan, 1.0)):
+        found = likelihood(model)(np.array([3.0, y]), x)
+        np.testing.assert_allclose(found, np.log(angle * other), rtol=1e-12)
 
 
 def by_grid(model_sd, meter_sd, prior, y, signal=lambda x: x):

@@ -47,6 +47,7 @@ def test_products_of_a_random_root_are_covariances():
         ("x + v*log(a)", "x + w", {"a": -1}, "state"),
         ("x + v", "sqrt(a)*x + w", {"a": -1}, "meter"),
         ("x + v/(a - 1)", "x + w", {"a": 1}, "state"),
+        ("x + v", "(1 if sqrt(a) > 0 else 2)*x + w", {"a": -1}, "meter"),
     ],
 )
 def test_numbers_out_of_all_sizes_are_refused_with_their_place(state, meter, parameters, place):
