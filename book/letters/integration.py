@@ -78,9 +78,17 @@ K = -PR^{-1}
 \delta\hat v = \delta\hat x
 \hat v = z_\text{INS}-\delta\hat x
 G = H
-\Psi = P^-
-p = P
-F = \Psi+R
+"""
+
+
+any_meter = r"""
+\Psi: cov 3
+D: cov 2
+G: any 2 3
+I: eye 3
+F = G\Psi G^T+D
+p = (\Psi^{-1}+G^TD^{-1}G)^{-1}
+K = pG^TD^{-1}
 """
 
 
@@ -181,6 +189,7 @@ LETTERS = (
     axis,
     errors,
     western,
+    any_meter,
     western_before,
     accelerometer,
     best_border,
