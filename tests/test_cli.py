@@ -176,7 +176,8 @@ def test_a_file_of_ones_own_with_a_shipped_variant_gives_the_same_numbers(
         == 0
     )
     assert call("lab", "53", *QUICK, "--json", "b.json", "--out", "b").exit_code == 0
-    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    own, shipped = (json.loads((tmp_path / f"{name}.json").read_text()) for name in "ab")
+    assert own | {"model": shipped["model"]} == shipped  # its table may be written otherwise
 
 
 def test_a_vector_variant_works(call, tmp_path):
