@@ -12,8 +12,7 @@ from click.testing import CliRunner
 from kfcourse import Model, cli, linearised, run, smooth
 from kfcourse.filters import aof, gated
 from kfcourse.lab import own_data
-from kfcourse.lab.own_data import estimate_record, judged, model_of
-from kfcourse.records.examination import Finding
+from kfcourse.lab.own_data import estimate_record, model_of
 from kfcourse.records.reading import read_measurements
 
 MODELS = """
@@ -274,9 +273,3 @@ def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
     result = call("--gate", 0.9)
     assert result.exit_code == 1 and "no pictures today" in result.output
     assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before
-
-
-def test_a_finding_in_words():
-    fits, not_so = (judged(Finding("neighbours of y2", value, -0.1, 0.1)) for value in (0.05, 0.3))
-    assert "not so here" not in fits and "0.050 (a filter that is right has -0.100 to 0.100" in fits
-    assert "y2: 0.300" in not_so and "claims more than it knows" in not_so

@@ -28,7 +28,7 @@ from kfcourse.lab.report import (
     write_report,
 )
 from kfcourse.lab.report_sections import StudentReport
-from kfcourse.lab.report_text import cause, filled, inline_tex, ranges, scalar_equations
+from kfcourse.lab.report_text import cause, filled, inline_tex, scalar_equations
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.comparison import Verdict
@@ -247,12 +247,6 @@ def test_both_languages_have_the_same_words_with_the_same_places():
         assert [name for name, _ in here] == [name for name, _ in there], key
         assert all(words.count("/") == (1 if words else 0) for _, words in here), key
         assert all(words.count("/") == (2 if words else 0) for _, words in there), key
-
-
-@pytest.mark.quick
-def test_runs_of_steps_are_joined_and_special_characters_escaped_outside_of_formulas():
-    assert ranges([1, 3, 4, 5, 8], "${}$") == "$1$, $3$–$5$, $8$" and ranges([2]) == "2"
-    assert inline_tex("a_b & 5 % – $x_k^2$ #") == r"a\_b \& 5 \% -- $x_k^2$ \#"
 
 
 # --- what the report says

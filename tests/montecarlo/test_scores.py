@@ -121,7 +121,7 @@ def test_modes_are_judged_by_their_mixture():
 
 @pytest.mark.parametrize("build", [imm, gpb2])
 def test_the_mixture_of_a_filter_with_modes(build):
-    """Two correlated meters in two modes, one trajectory in sixty-six by quadrature: weights and
+    """Two correlated meters in two modes, one trajectory by quadrature: weights and
     laws are those of the state before the measurement."""
     model = JumpModel.define(
         "a*x + 0.6*v",
@@ -136,7 +136,7 @@ def test_the_mixture_of_a_filter_with_modes(build):
     chosen = build(structures, model, model.first)
     y = np.random.default_rng(2).standard_normal((2, 1, 2))
     before = states(chosen, y)
-    for k, now in enumerate(y):
+    for k, now in [*enumerate(y)][1:]:
         memory = before[k].memory
         laws = [structures[i % 2].at(k).measure(*law) for i, law in enumerate(memory.predicted)]
         F = [np.broadcast_to(law.F, (1, 2, 2))[0] for law in laws]
