@@ -196,7 +196,7 @@ ROOMS = {
     "kfcourse/continuous": 10_530,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_450,
-    "kfcourse/lab": 19_890,
+    "kfcourse/lab": 19_900,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_210,
     "kfcourse/notebooks": 26_820,
@@ -204,7 +204,7 @@ ROOMS = {
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_340,
     "kfcourse/symbolic": 23_630,
-    "tests": 210_670,
+    "tests": 210_730,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
