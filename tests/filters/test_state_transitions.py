@@ -8,6 +8,7 @@ from kfcourse import JumpModel, ModelError, gaussian, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.experiment import states
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
 pytestmark = pytest.mark.quick
@@ -36,11 +37,9 @@ def test_a_constant_formula_is_the_constant_matrix_bit_for_bit(build):
     numbers = overloaded([[0.9, 0.1], [0.3, 0.7]])
     formulas = overloaded([["0.9 + 0*x", "0.1 + x - x"], ["0.3*x/x", "0.35*2"]])
     assert not formulas.by_state
-    drawn = [simulate(one, 20, 10, seed=1) for one in (numbers, formulas)]
-    for left, right in zip(*drawn, strict=True):
-        np.testing.assert_array_equal(left, right)
-    found = [run(of(build, one), drawn[0].y) for one in (numbers, formulas)]
-    for left, right in zip(*found, strict=True):
+    drawn = [simulate(model, 20, 10, seed=1) for model in (numbers, formulas)]
+    laws = [run(of(build, model), drawn[0].y) for model in (numbers, formulas)]
+    for left, right in (*zip(*drawn, strict=True), *zip(*laws, strict=True)):
         np.testing.assert_array_equal(left, right)
 
 
@@ -118,14 +117,12 @@ def test_components_that_the_chain_does_not_contain_follow_by_regression():
 def test_the_exact_filter_is_a_plain_grid_of_both():
     model, x = overloaded(), np.linspace(-14, 14, 3001)
     y = simulate(model, 3, 8, seed=5).y
-    one = pointmass(model)
-    state, step = one.init(3), x[1] - x[0]
+    visited, step = states(pointmass(model), y), x[1] - x[0]
     prior = np.exp(-((x - 0.5) ** 2) / 6)
     grids = [np.stack([0.9 * prior, 0.1 * prior]) for _ in range(3)]
     kernel = np.exp(-0.5 * ((x[:, None] - 0.9 * x) / 0.7) ** 2) * step
     to_faulty = probabilities(x).T
-    for k in range(8):
-        state = one.step(state, y[k])
+    for k, state in enumerate(visited[1:]):
         for trajectory, value in enumerate(y[k, :, 0]):
             density = grids[trajectory]
             for j, C in enumerate((1.0, 10.0)):
@@ -167,8 +164,8 @@ def test_the_exact_filter_follows_probabilities_that_jump():
     jump = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
     steep = overloaded([["1/(1 + exp(1000*(x - 1)))", "1 - 1/(1 + exp(1000*(x - 1)))"], [0.3, 0.7]])
     y = simulate(jump, 40, 8, seed=1).y
-    found, expected = run(pointmass(jump), y), run(pointmass(steep), y)
-    assert (np.abs(found.mean - expected.mean) < 0.01 * np.sqrt(expected.cov[..., 0])).all()
+    law, expected = run(pointmass(jump), y), run(pointmass(steep), y)
+    assert (np.abs(law.mean - expected.mean) < 0.01 * np.sqrt(expected.cov[..., 0])).all()
 
 
 @pytest.mark.parametrize(
