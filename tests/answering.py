@@ -163,7 +163,7 @@ def state_of(tab, handle_or_slider) -> float:
     return float(handle_or_slider.get_attribute("aria-valuenow") or handle_or_slider.input_value())
 
 
-def said(tab) -> list[float]:
+def numbers_of(tab) -> list[float]:
     """The numbers of the status line: in their order."""
     text = tab.get_by_role("status").inner_text().replace("−", "-")
     return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
