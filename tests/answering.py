@@ -45,7 +45,7 @@ def sine_and_lines() -> str:
     model = Model.define("x + 0.1*v", "sin(x) + 0.05*w")
     tangent, best = linearised(model), gaussian(model)
     (angle,), (m,), (d,) = model.x, best.formulas.m, best.formulas.d
-    lines = [(one["h"], one["G"]) for one in (tangent, best)]
+    lines = [(functional["h"], functional["G"]) for functional in (tangent, best)]
     left = (best["F"] - best["G"] ** 2 * d) - (tangent["F"] - tangent["G"] ** 2 * d)
     return explore.two_lines(
         "fig-better-line",
