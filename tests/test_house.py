@@ -200,11 +200,11 @@ ROOMS = {
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_220,
     "kfcourse/notebooks": 26_820,
-    "kfcourse/pages": 10_140,
+    "kfcourse/pages": 9_940,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 23_630,
-    "tests": 209_570,
+    "tests": 209_390,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

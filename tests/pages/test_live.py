@@ -79,26 +79,9 @@ def test_a_recording_is_the_track_and_its_noise():
     np.testing.assert_array_equal(recording.position, recording.position.round(3))
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: live.page(RECORDING, interval=15), "interval: expected 10, 20, ..., 200, got 15"),
-        (
-            lambda: live.page(RECORDING, decibels=float("nan")),
-            "decibels: expected 30, 31, ..., 80, got nan",
-        ),
-        (lambda: live.page(live.Recording(np.zeros((5, 2)), np.zeros((4, 2)))), "of one shape"),
-        (
-            lambda: live.page(live.Recording(np.full((5, 2), np.nan), np.zeros((5, 2)))),
-            "must be finite",
-        ),
-        (lambda: RECORDING.sampled(0.015, 8.0), "multiple of 0.01 s"),
-        (lambda: RECORDING.sampled(0.02, -1.0), "standard deviation"),
-    ],
-)
-def test_arguments_that_do_not_fit(call, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        call()
+def test_an_interval_beside_the_grid_is_refused():
+    with pytest.raises(ValueError, match=r"multiple of 0.01 s"):
+        RECORDING.sampled(0.015, 8.0)
 
 
 # ---------------------------------------------------------------- the browser

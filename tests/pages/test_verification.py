@@ -61,8 +61,8 @@ def test_numbers_to_so_many_digits() -> None:
     assert "to 10 digits, at 3 points" in verified((fourier, right), digits=10).markdown
     with pytest.raises(Unverified, match="the left side is"):
         verified((fourier, right * (1 + sp.Rational(1, 10**9))), digits=10)
-    with pytest.raises(ValueError, match="`at` gives every symbol a value"):
-        verified((fourier, right), digits=5, at=[{x: 1}])
+    with pytest.raises(ValueError, match="no number is left"):
+        verified((sp.Function("f")(x), x), digits=5)
 
 
 def test_what_is_printed_alike_needs_a_name() -> None:
