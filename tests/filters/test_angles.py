@@ -21,6 +21,7 @@ from kfcourse.filters import (
     pointmass,
 )
 from kfcourse.filters.densities import likelihood
+from kfcourse.filters.optimal_structure import Memory, Remembered
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees
 from kfcourse.montecarlo.designing import design
@@ -262,6 +263,14 @@ def test_what_a_filter_remembers_of_a_measured_angle_is_its_innovation():
     (filter_,) = design([fos(linearised(model), 3)], Ensemble(model, 100, 1, seed=1))
     kept = filter_.step(filter_.init(3), np.array([[3.0], [-3.1], [np.nan]])).memory.measurements
     np.testing.assert_allclose(kept[0].ravel(), [-0.1, 2 * PI - 6.2, 0], atol=1e-12)
+
+
+def test_angles_are_kept_together_where_estimates_are_remembered():
+    """A turn that goes on through pi: what was estimated before is kept within half a turn of what
+    is estimated now."""
+    before = Remembered((np.array([[3.1, 2.0]]),))
+    kept = before.and_now(np.array([[-3.1, 2.1]]), np.empty((1, 0)), Memory(2), turning=(0,))
+    np.testing.assert_allclose(kept.regressor, [[-3.1, 2.1, 3.1 - 2 * PI, 2.0]])
 
 
 # ---------------------------------------------------------------- densities on the circle
