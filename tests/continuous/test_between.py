@@ -2,7 +2,6 @@
 published figures."""
 
 import dataclasses
-import json
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +27,7 @@ from kfcourse.cli import main
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
 from kfcourse.filters import aof, duof, fos, kalman_filter
-from kfcourse.lab import find_variant
-from kfcourse.lab.variants import VariantError, summary
+from kfcourse.lab.variants import VariantError, read_variant, summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.records import estimate, read_measurements
@@ -543,61 +541,49 @@ def test_many_trajectories_that_turn_fast_are_no_stiff_ones():
     np.testing.assert_allclose(tau, z @ turn.T, rtol=0, atol=4e-3)
 
 
-def test_a_table_has_drift_and_diffusion(tmp_path):
-    """The school's CD1 with a drift that comes back, from a file; and what is wrong with tables."""
-    path = tmp_path / "my.toml"
-    table = """[variants.{}]
-title = "cubic drift, quadratic meter"
-drift = "a1*x + a3*x**3"
-{}
-meter = "x + 0.5*x**2 + w"
-parameters = {{ a1 = -0.5, a3 = -0.01 }}
-steps = 11
-"""
-    texts = [
-        table.format(name, more)
-        for name, more in (("CD1", 'diffusion = "1.5"'), ("none", ""), ("row", 'diffusion = ["1"]'))
-    ]
-    path.write_text(
-        "\n".join([*texts, table.format("state", 'diffusion = "1"\nstate = "x"')]), encoding="utf-8"
-    )
-    chosen = find_variant("CD1", path)
-    assert chosen.steps == 11 and chosen.model.between.diffusion[0] == sp.Rational(3, 2)
+TABLE = {
+    "title": "cubic drift, quadratic meter",
+    "drift": "a1*x + a3*x**3",
+    "meter": "x + 0.5*x**2 + w",
+    "parameters": {"a1": -0.5, "a3": -0.01},
+    "steps": 11,
+}
+
+
+def test_a_table_has_drift_and_diffusion():
+    """The school's CD1 with a drift that comes back."""
+    variant = read_variant("CD1", TABLE | {"diffusion": "1.5"}, "here")
+    assert variant.steps == 11 and variant.model.between.diffusion[0] == sp.Rational(3, 2)
     z, p = 0.7, 0.4
-    equations = moment_equations(chosen.model)
-    at = {equations.z[0]: z, equations.p[0]: p} | chosen.model.values
+    equations = moment_equations(variant.model)
+    at = {equations.z[0]: z, equations.p[0]: p} | variant.model.values
     # the page's: a1 z + a3 (z^3 + 3 z p), a1 + 3 a3 (z^2 + p), 2.25
     wanted = [-0.5 * z - 0.01 * (z**3 + 3 * z * p), -0.5 - 0.03 * (z**2 + p), 2.25]
     assert [float(part[0].subs(at)) for part in equations[2:]] == pytest.approx(wanted, abs=1e-12)
-    h, G, F, _ = gaussian(chosen.model).at(0).measure(np.array([[z]]), np.array([[[p]]]))
-    assert [h.item(), G.item(), F.item()] == pytest.approx(
-        [z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + 1]
-    )
-    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", chosen.table)
-    for name, words in (
-        ("none", "no diffusion"),
-        ("row", "list of rows"),
-        ("state", "unknown key state"),
-    ):
-        with pytest.raises(VariantError, match=words):
-            find_variant(name, path)
+    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", variant.table)
 
 
-def test_the_command_ranks_the_filters_of_such_a_variant(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, "no diffusion"),
+        ({"diffusion": ["1"]}, "list of rows"),
+        ({"diffusion": "1", "state": "x"}, "unknown key state"),
+    ],
+)
+def test_tables_that_are_no_variant_are_refused(change, words):
+    with pytest.raises(VariantError, match=words):
+        read_variant("CD1", TABLE | change, "here")
+
+
+def test_the_command_compares_the_filters_of_such_a_variant(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("my.toml").write_text(
         '[variants.mine]\ndrift = "-a*x"\ndiffusion = "1"\nmeter = "x + w"\nparameters = { a = '
         "0.5 }\n"
     )
-    chosen = ["--filters", "aof-linearised,duof", "--runs", "300", "--steps", "3"]
-    done = CliRunner().invoke(
-        main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"]
-    )
+    sizes = ["--runs", "128", "--steps", "2", "--filters", "aof-exact,aof-linearised", "--scores"]
+    done = CliRunner().invoke(main, ["lab", "mine", "--variants", "my.toml", *sizes])
     assert done.exit_code == 0 and "LAOF" in done.stdout and Path("lab-mine/report.tex").exists()
-    numbers = json.loads(Path("numbers.json").read_text(encoding="utf-8"))
-    assert numbers["model"]["drift"] == ["-a*x"] and numbers["model"]["diffusion"] == ["[1]"]
-    assert "log score" not in done.stdout and "log_score" not in numbers
-    command = ["lab", "mine", "--variants", "my.toml", "--runs", "128", "--steps", "2", "--scores"]
-    done = CliRunner().invoke(main, [*command, "--filters", "aof-exact,aof-linearised"])
     scores = done.stdout.split("CRPS\n")[1].splitlines()[:2]
     assert [line.split()[-1] == "–" for line in scores] == [True, False]  # its law is not normal
