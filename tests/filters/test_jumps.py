@@ -41,16 +41,12 @@ SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10
 LASTING, FIRST = [[0.9, 0.1], [0.3, 0.7]], [0.8, 0.2]
 
 
-def failing(modes=SENSOR, transition=LASTING, first=FIRST):
-    return JumpModel.define(
-        "0.9*x + s*v",
-        "x + C*w",
-        {"s": 0.7},
-        modes=modes,
-        transition=transition,
-        first=first,
-        prior={"mean": 3, "variance": 4},
-    )
+def failing(
+    modes=SENSOR, transition=LASTING, first=FIRST, state="0.9*x + 0.7*v", mean=3, variance=4
+):
+    """A sensor that fails."""
+    chain = {"modes": modes, "transition": transition, "first": first}
+    return JumpModel.define(state, "x + C*w", **chain, prior={"mean": mean, "variance": variance})
 
 
 AFFINE = JumpModel.define(
@@ -83,7 +79,7 @@ CURVED = JumpModel.define(
 
 
 def of(build, model, kind=gaussian):
-    return build([kind(mode) for mode in model.modes], model.transition_at, model.first)
+    return build([kind(mode) for mode in model.modes], model)
 
 
 # --- the exact filter

@@ -3,8 +3,9 @@ refused."""
 
 import numpy as np
 import pytest
+from test_jumps import SENSOR, failing, of
 
-from kfcourse import JumpModel, ModelError, gaussian, linearised, run, simulate
+from kfcourse import JumpModel, ModelError, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
@@ -13,23 +14,17 @@ from kfcourse.symbolic.averaging import averaged, averaged_equations
 
 pytestmark = pytest.mark.quick
 
-SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10.0}}}
 FAR = [["0.98*exp(-x**2/8)", "1 - 0.98*exp(-x**2/8)"], ["0.3*exp(-x**2/8)", "1 - 0.3*exp(-x**2/8)"]]
 
 
-def overloaded(transition=FAR, modes=SENSOR, state="0.9*x + 0.7*v", **options):
-    given = {"first": [0.9, 0.1], "prior": {"mean": 0.5, "variance": 3}} | options
-    return JumpModel.define(state, "x + C*w", modes=modes, transition=transition, **given)
+def overloaded(transition=FAR, **options):
+    return failing(transition=transition, first=[0.9, 0.1], mean=0.5, variance=3, **options)
 
 
 def probabilities(x):
     """Of a failure next, from sound and from faulty, straight from the formulas."""
     near = np.exp(-x * x / 8)
     return np.stack([1 - 0.98 * near, 1 - 0.3 * near], axis=-1)
-
-
-def of(build, model, kind=gaussian):
-    return build([kind(mode) for mode in model.modes], model, model.first)
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
