@@ -200,7 +200,7 @@ ROOMS = {
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_220,
     "kfcourse/notebooks": 26_820,
-    "kfcourse/pages": 9_780,
+    "kfcourse/pages": 9_640,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 23_630,
