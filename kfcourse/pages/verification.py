@@ -61,9 +61,9 @@ def verified(
     *equations : (left, right, ...)
         Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is
         printed and not checked, so at least two others are needed then.  Where all sides print
-        alike a string before them must say what they are.  `sympy.Eq` is taken too, unless SymPy
-        has already made it true or false.  A function that returns the equations, `lambda: [(p,
-        Psi - K*S*Psi)]`, has its terms and factors printed in the order in which they stand there.
+        alike a string before them must say what they are.  A function that returns the equations,
+        `lambda: [(p, Psi - K*S*Psi)]`, has its terms and factors printed in the order in which
+        they stand there.
     where : mapping of symbols to expressions
         What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference
         is taken, as often as it takes.
@@ -189,7 +189,7 @@ def _holds(sentence: str) -> Shown:
 
 def _given(equations: Sequence[Any]) -> list[tuple[Side, ...]]:
     if not callable(equations[0]):
-        return [_sides(equation) for equation in equations]
+        return [(each,) if isinstance(each, str) else tuple(each) for each in equations]
     with sp.evaluate(False):
         return [tuple(map(_as_written, sides)) for sides in equations[0]()]
 
@@ -204,19 +204,6 @@ def _as_written(side: Side) -> Side:
             lambda part: part.func(*sum(map(part.func.make_args, part.args), ())),
         )
     )
-
-
-def _sides(equation: Any) -> tuple[Side, ...]:
-    if isinstance(equation, sp.logic.boolalg.BooleanAtom | bool):
-        raise Unverified(
-            f"SymPy has already made this equation {equation}: nothing is left to print.  Give "
-            f"its sides: verified((left, right))"
-        )
-    if isinstance(equation, sp.Equality):
-        return equation.lhs, equation.rhs
-    if isinstance(equation, str):
-        return (equation,)
-    return tuple(equation)
 
 
 def _must_vanish(left: Any, right: Any, where: Mapping[Any, Any]) -> None:
