@@ -200,11 +200,11 @@ ROOMS = {
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_220,
     "kfcourse/notebooks": 26_820,
-    "kfcourse/pages": 10_140,
+    "kfcourse/pages": 9_580,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 23_630,
-    "tests": 216_630,
+    "tests": 209_150,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -36,9 +36,9 @@ def test_a_display_is_taken_apart():
         r"\begin{aligned} a&=f(b,c), & d&=\begin{pmatrix}1&2\\3&4\end{pmatrix},\\ e&\le "
         r"g\text{ and so on}.\end{aligned}"
     )
-    found = pieces(display)
-    assert found[0] == normal("a=f(b,c)")
-    assert len(found) == 3 and all(map(is_relation, found))
+    parts = pieces(display)
+    assert parts[0] == normal("a=f(b,c)")
+    assert len(parts) == 3 and all(map(is_relation, parts))
     assert not is_relation(normal(r"\sum_{i=1}^n x_i")) and is_relation(
         normal(r"x\sim\mathcal N(0,1)")
     )
@@ -58,13 +58,13 @@ def test_a_display_is_taken_apart():
 def test_relations_of_matrices_hold_and_changed_ones_do_not(right: str):
     holds(right, RUN)
     wrong = [
-        right.replace(*one, 1)
-        for one in (("^T", ""), ("+", "-"), ("-K", "+K"), ("K_k", "K_{k+1}"), ("=", "=2"))
+        right.replace(*text, 1)
+        for text in (("^T", ""), ("+", "-"), ("-K", "+K"), ("K_k", "K_{k+1}"), ("=", "=2"))
     ]
-    for one in wrong:
-        if one != right:
+    for text in wrong:
+        if text != right:
             with pytest.raises((Unverified, Unread)):
-                holds(one, RUN)
+                holds(text, RUN)
 
 
 @pytest.mark.parametrize(
@@ -110,8 +110,8 @@ def test_letters_of_any_length_functions_and_what_depends_on_variables():
         r"p(x\mid y)=6; \frac{\partial S}{\partial x}x=10; a^2(x,y)=25; z\leftarrow z+2y; "
         r"\mathsf M(x-y)^2=1"
     )
-    for one in (*right.split("; "), r"\hat x_{k\mid k-1}=2", r"\hat x_{k\mid k}=4"):
-        holds(one, letters)
+    for text in (*right.split("; "), r"\hat x_{k\mid k-1}=2", r"\hat x_{k\mid k}=4"):
+        holds(text, letters)
     for wrong in (r"p(y\mid x)=6", "S'=1", r"z\leftarrow z+y", r"x\leftarrow 2"):
         with pytest.raises((Unverified, Unread)):
             holds(wrong, letters)
