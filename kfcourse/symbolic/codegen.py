@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
@@ -152,25 +152,21 @@ def _assembler(
     """Puts the entries of one output together, the values of those that vary from an iterator."""
     indices = [(i,) if is_vector else (i, j) for i, j in product(*map(range, matrix.shape))]
     constant = np.zeros(matrix.shape[:1] if is_vector else matrix.shape)
+    varying = []
     for index, entry in zip(indices, matrix, strict=True):
-        constant[index] = float(entry) if entry.is_number else 0.0
-    varying = [index for index, entry in zip(indices, matrix, strict=True) if not entry.is_number]
-    enter = [
-        number
-        for number, (_, m) in enumerate(arguments)
-        if is_vector or m.free_symbols & matrix.free_symbols
-    ]
+        if entry.is_number:
+            constant[index] = float(entry)
+        else:
+            varying.append(index)
+    enter = [is_vector or bool(m.free_symbols & matrix.free_symbols) for _, m in arguments]
 
     def assemble(values: Any, leads: list[tuple[int, ...]]) -> Array:
-        if not varying:
-            return constant.copy()
-        if len(indices) == 1:  # no copy of the one component
-            return np.asarray(next(values))[(..., *(None for _ in constant.shape))]
-        result = np.empty(
-            np.broadcast_shapes(*(leads[number] for number in enter)) + constant.shape
-        )
-        if len(varying) < len(indices):
-            result[...] = constant
+        lead = np.broadcast_shapes(*compress(leads, enter))
+        if varying and constant.size == 1:  # no copy of the one component
+            value = np.broadcast_to(next(values), lead)
+            return value[(..., *(None for _ in constant.shape))]
+        result = np.empty(lead + constant.shape)
+        result[...] = constant
         for index in varying:
             result[(..., *index)] = next(values)
         return result

@@ -21,13 +21,11 @@ from functools import cached_property, lru_cache, partial
 from itertools import product as cartesian
 from typing import Any, NoReturn
 
-import numpy as np
 import sympy as sp
 
-from kfcourse.angles import Components, on_circle
+from kfcourse.angles import on_circle
 from kfcourse.errors import ModelError, NoClosedForm, expect
 from kfcourse.laws import (
-    Array,
     Gaussian,
     Matrices,
     Measurement,
@@ -222,6 +220,10 @@ class StructuralFormulas:
         predict, measure = self.compiled_predict.at(k), self.compiled_measure.at(k)
         angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
 
+        def predicted(z: Vectors, p: Matrices) -> Gaussian:
+            tau, Theta = predict(z, p)
+            return Gaussian(on_circle(tau, angles.x), Theta)
+
         def measured(m: Vectors, d: Matrices) -> Measurement:
             h, G, R, explained = measure(m, d)
             return measurement(h, G, explained + R, R)
@@ -229,7 +231,7 @@ class StructuralFormulas:
         return Structure(
             self.name,
             self.model,
-            lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
+            predicted,
             measured,
             # compiled where it is asked for
             lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),
@@ -258,13 +260,6 @@ def of_steps(
         if timed or model.timed
         else at(None)
     )
-
-
-def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
-    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and
-    pi."""
-    mean = law.mean if law.mean.ndim == over.ndim else np.broadcast_to(law.mean, over.shape)
-    return Gaussian(on_circle(mean, angles), law.cov)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:

@@ -238,14 +238,18 @@ def test_what_is_printed_names_the_step():
         (
             {"state_noise": {"variance": [["k"]]}},
             ModelError,
-            "mean and variance must be numbers",
+            "mean and variance must be finite numbers",
         ),
         (
             {"state_noise": {"variance": ["k", 1]}},
             ModelError,
-            r"2 variances for 1 noise\(s\)",
+            r"lists of 1 numbers",
         ),
-        ({"prior": {"variance": "k"}}, ModelError, "`prior`: mean and variance must be numbers"),
+        (
+            {"prior": {"variance": "k"}},
+            ModelError,
+            "`prior`: mean and variance must be finite numbers",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused(options, error, message):
