@@ -91,10 +91,14 @@ def _compiled(
                 "give it a value, or make it an argument"
             )
     renamed = {key: place[0] for key, place in places.items()}
-    varying = [matrix.xreplace(renamed) for _, matrix in outputs if matrix.free_symbols]
-    used = set().union(*(matrix.free_symbols for matrix in varying))
+    entries = [
+        _in_floats(entry.xreplace(renamed))
+        for _, matrix in outputs
+        for entry in matrix
+        if not entry.is_number
+    ]
+    used = set().union(*(entry.free_symbols for entry in entries))
     taken = [place for place in places.values() if place[0] in used]
-    entries = [_in_floats(entry) for matrix in varying for entry in matrix if not entry.is_number]
     formulas = sp.lambdify(
         [symbol for symbol, *_ in taken], entries, ["scipy", "numpy"], cse=_shared
     )
