@@ -193,7 +193,7 @@ ROOMS = {
     "exercises": 41_750,
     "kfcourse/*.py": 6_490,
     "kfcourse/checks": 20_010,
-    "kfcourse/continuous": 10_550,
+    "kfcourse/continuous": 10_530,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_460,
     "kfcourse/lab": 21_300,

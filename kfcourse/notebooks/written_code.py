@@ -44,7 +44,7 @@ class Apart(NamedTuple):
     @property
     def says(self) -> str:
         """The curve in a sentence."""
-        half, one = (_percent(self.missing[place]) for place in (9, 19))
+        half, twentieth = (_percent(self.missing[place]) for place in (9, 19))
         large = DEVIATIONS[np.abs(self.missing) > 0.1]
         tenth = (
             f"it is more than a tenth from {large[0]:.2g} on"
@@ -52,7 +52,7 @@ class Apart(NamedTuple):
             else "nowhere in the picture is it a tenth"
         )
         return (
-            f"The tangent's {self.label} is {half} at a standard deviation of 0.5, and {one} "
+            f"The tangent's {self.label} is {half} at a standard deviation of 0.5, and {twentieth} "
             f"at 1; {tenth}."
         )
 
