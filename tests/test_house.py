@@ -193,9 +193,9 @@ ROOMS = {
     "exercises": 41_750,
     "kfcourse/*.py": 6_490,
     "kfcourse/checks": 20_010,
-    "kfcourse/continuous": 10_530,
+    "kfcourse/continuous": 10_540,
     "kfcourse/derivations": 14_930,
-    "kfcourse/filters": 33_460,
+    "kfcourse/filters": 33_450,
     "kfcourse/lab": 21_300,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_220,
@@ -203,8 +203,8 @@ ROOMS = {
     "kfcourse/pages": 10_140,
     "kfcourse/records": 6_300,
     "kfcourse/scenarios": 11_590,
-    "kfcourse/symbolic": 21_770,
-    "tests": 214_620,
+    "kfcourse/symbolic": 21_760,
+    "tests": 214_570,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
