@@ -198,11 +198,11 @@ ROOMS = {
     "kfcourse/filters": 33_450,
     "kfcourse/lab": 21_300,
     "kfcourse/linear": 6_770,
-    "kfcourse/montecarlo": 11_220,
+    "kfcourse/montecarlo": 11_210,
     "kfcourse/notebooks": 26_820,
     "kfcourse/pages": 9_580,
     "kfcourse/records": 6_320,
-    "kfcourse/scenarios": 11_590,
+    "kfcourse/scenarios": 11_340,
     "kfcourse/symbolic": 23_630,
     "tests": 209_150,
 }
