@@ -199,12 +199,12 @@ ROOMS = {
     "kfcourse/lab": 21_310,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_220,
-    "kfcourse/notebooks": 26_820,
+    "kfcourse/notebooks": 26_120,
     "kfcourse/pages": 10_140,
     "kfcourse/records": 6_320,
     "kfcourse/scenarios": 11_590,
     "kfcourse/symbolic": 23_630,
-    "tests": 216_630,
+    "tests": 211_820,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
