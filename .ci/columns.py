@@ -15,15 +15,15 @@ COLUMNS = 78
 
 def long_lines(path: Path) -> list[str]:
     """The lines of a page's code that are too long, with their places."""
-    found, inside = [], False
+    long, inside = [], False
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         if line.lstrip().startswith("```"):
             inside = (not inside and "{code-cell}" in line) or line.lstrip().startswith(
                 ("```python", "```bash")
             )
         elif inside and not line.startswith(":") and len(line) > COLUMNS:
-            found.append(f"{path}:{number}: {len(line)} columns, {COLUMNS} fit the page")
-    return found
+            long.append(f"{path}:{number}: {len(line)} columns, {COLUMNS} fit the page")
+    return long
 
 
 def main(names: list[str]) -> int:
@@ -31,9 +31,9 @@ def main(names: list[str]) -> int:
         *ROOT.glob("book/*.md"),
         *ROOT.glob("exercises/*/statement.md"),
     ]
-    found = [line for path in sorted(paths) for line in long_lines(path)]
-    print("\n".join(found) or f"{len(paths)} pages: all code fits {COLUMNS} columns")
-    return bool(found)
+    long = [line for path in sorted(paths) for line in long_lines(path)]
+    print("\n".join(long) or f"{len(paths)} pages: all code fits {COLUMNS} columns")
+    return bool(long)
 
 
 if __name__ == "__main__":

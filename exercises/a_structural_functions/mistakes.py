@@ -32,7 +32,7 @@ CORRELATION_FORGOTTEN = "Only the variances are there; the components are correl
 SECOND_MOMENT = "It is a second moment: the product of the means has not been subtracted."
 
 
-def one(matrix: sp.MatrixBase) -> sp.Expr:
+def scalar_of(matrix: sp.MatrixBase) -> sp.Expr:
     """The entry of a one by one matrix; ValueError otherwise: some mistakes are possible for
     scalars only."""
     if matrix.shape != (1, 1):
@@ -42,7 +42,7 @@ def one(matrix: sp.MatrixBase) -> sp.Expr:
 
 def factors(s: Side) -> tuple[sp.Expr, sp.Expr]:
     """The noise's factor, split: what is made of parameters, and what depends on the state."""
-    B, z = one(s.B), one(s.mean)
+    B, z = scalar_of(s.B), scalar_of(s.mean)
     rest, dependent = B.as_independent(z, as_Add=False)
     return rest, dependent
 
@@ -65,14 +65,16 @@ def _several(s: Side) -> Side:
 def _slope_of_noise(s: Side) -> sp.Expr:
     """How the noise's factor changes with the state; ValueError if it does not: then it cannot get
     into the slope."""
-    slope = one(s.B).diff(one(s.mean))
+    slope = scalar_of(s.B).diff(scalar_of(s.mean))
     if slope == 0:
         raise ValueError("only where the noise's factor depends on the state")
     return slope
 
 
 def _slope_with_noise(s: Side) -> sp.Matrix:
-    return _scalar((one(s.A) + _slope_of_noise(s)) ** 2 * one(s.cov) + one(noise_part(s)))
+    return _scalar(
+        (scalar_of(s.A) + _slope_of_noise(s)) ** 2 * scalar_of(s.cov) + scalar_of(noise_part(s))
+    )
 
 
 # The covariance of the linearised function: A cov A^T + B D B^T.
@@ -80,18 +82,22 @@ WRONG_LINEARISED: tuple[Row, ...] = (
     (
         "noise-not-squared",
         NOT_SQUARED_AS_A_WHOLE,
-        lambda s: _scalar(one(s.A) ** 2 * one(s.cov) + factors(s)[0] * factors(s)[1] ** 2),
+        lambda s: _scalar(
+            scalar_of(s.A) ** 2 * scalar_of(s.cov) + factors(s)[0] * factors(s)[1] ** 2
+        ),
     ),
     (
         "noise-not-squared",
         NOT_SQUARED_AS_A_WHOLE,
-        lambda s: _scalar(one(s.A) ** 2 * one(s.cov) + factors(s)[0] ** 2 * factors(s)[1]),
+        lambda s: _scalar(
+            scalar_of(s.A) ** 2 * scalar_of(s.cov) + factors(s)[0] ** 2 * factors(s)[1]
+        ),
     ),
     ("noise-in-slope", NOISE_IN_SLOPE, _slope_with_noise),
     (
         "noise-times-variance",
         NOISE_TIMES_VARIANCE,
-        lambda s: _scalar((one(s.A) ** 2 + one(noise_part(s))) * one(s.cov)),
+        lambda s: _scalar((scalar_of(s.A) ** 2 + scalar_of(noise_part(s))) * scalar_of(s.cov)),
     ),
     (
         "second-moment",
@@ -141,14 +147,16 @@ def averaged(s: Side, moment: Moment) -> sp.Expr:
     ValueError if the factor is no polynomial, or the same everywhere, so that no moment is taken.
     """
     x = s.x[0]
-    factor = one(s.equation.jacobian(sp.Matrix(s.noise))).subs(
+    factor = scalar_of(s.equation.jacobian(sp.Matrix(s.noise))).subs(
         dict(zip(s.noise, s.law.mean, strict=True))
     )
-    powers = sp.Poly(factor**2 * one(s.D), x)
+    powers = sp.Poly(factor**2 * scalar_of(s.D), x)
     terms = [(k, c) for (k,), c in powers.terms()]
     if any(k % 2 or k > 8 for k, _ in terms) or not any(k for k, _ in terms):
         raise ValueError("no polynomial of even powers that depends on the state")
-    return sum((c * moment(k, one(s.mean), one(s.cov)) for k, c in terms), sp.Integer(0))
+    return sum(
+        (c * moment(k, scalar_of(s.mean), scalar_of(s.cov)) for k, c in terms), sp.Integer(0)
+    )
 
 
 def exact_noise_part(s: Side) -> sp.MatrixBase:
@@ -191,7 +199,7 @@ WRONG_NOISE_PARTS: tuple[Row, ...] = (
         for name, says, moment in WRONG_MOMENTS
     ),
     ("noise-not-squared", NOT_SQUARED_AS_A_WHOLE, lambda s: exact_noise_part(s) / factors(s)[0]),
-    ("noise-times-variance", NOISE_TIMES_VARIANCE, lambda s: noise_part(s) * one(s.cov)),
+    ("noise-times-variance", NOISE_TIMES_VARIANCE, lambda s: noise_part(s) * scalar_of(s.cov)),
     (
         "noises-in-another-order",
         NOISES_IN_ANOTHER_ORDER,
@@ -202,7 +210,7 @@ WRONG_NOISE_PARTS: tuple[Row, ...] = (
 
 def _slope_power(s: Side) -> sp.Matrix:
     """A p in place of A p A, for a linear function."""
-    return _scalar(one(s.A) * one(s.cov) - one(s.A) ** 2 * one(s.cov))
+    return _scalar(scalar_of(s.A) * scalar_of(s.cov) - scalar_of(s.A) ** 2 * scalar_of(s.cov))
 
 
 # What is added to the exact covariance.

@@ -25,7 +25,7 @@ from kfcourse.exercises.a_structural_functions.mistakes import (
     WRONG_NOISE_PARTS,
     WRONG_STATE_PARTS,
     exact_noise_part,
-    one,
+    scalar_of,
 )
 from kfcourse.symbolic.sides import Side, plain
 
@@ -97,7 +97,7 @@ def wrong_slope(kind: str) -> Mistake:
 
     def make(exercise: Exercise) -> tuple:
         h, _, F = right(kind, "meter")(exercise)
-        return one(sp.Matrix([h])), h, F
+        return scalar_of(sp.Matrix([h])), h, F
 
     return Mistake("function-for-derivative", FUNCTION_FOR_DERIVATIVE, constant(make))
 
@@ -183,7 +183,7 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
         (
             "function-for-derivative",
             FUNCTION_FOR_DERIVATIVE,
-            lambda s: sp.Matrix([one(s.value) ** 2 * one(s.cov)]) + s.B * s.D * s.B.T,
+            lambda s: sp.Matrix([scalar_of(s.value) ** 2 * scalar_of(s.cov)]) + s.B * s.D * s.B.T,
         ),
         (
             "transposed",
@@ -286,7 +286,7 @@ def jacobians(
 def _unevaluated(exercise: Exercise) -> tuple:
     """Derivatives divided by the variable: the slope of a secant through 0, not of the tangent."""
     part = Side.of(exercise.model, "object")
-    return plain(sp.Matrix([one(part.value) / one(part.mean)])), plain(part.B)
+    return plain(sp.Matrix([scalar_of(part.value) / scalar_of(part.mean)])), plain(part.B)
 
 
 def unexplained_with(part: Callable[[Side], sp.MatrixBase]) -> ForVariant:
@@ -438,7 +438,7 @@ QUESTIONS = (
                         sp.Matrix([right("gaussian", "meter")(e)[2]])
                         - sp.Matrix(
                             [
-                                one(sp.Matrix([right("gaussian", "meter")(e)[1]]))
+                                scalar_of(sp.Matrix([right("gaussian", "meter")(e)[1]]))
                                 * Side.of(e.model, "meter").cov[0]
                             ]
                         )

@@ -128,10 +128,10 @@ def covariance_arguments(exercise: Exercise) -> list[tuple]:
     at = hidden_law(exercise, "b5")
     _, G, _, R = hidden_meter(exercise, at)
     # a scalar meter, far sharper than the prediction
-    one, sharp = np.full((RUNS, 1, 1), 0.7), np.full((RUNS, 1, 1), 1e-18)
+    level, sharp = np.full((RUNS, 1, 1), 0.7), np.full((RUNS, 1, 1), 1e-18)
     return [
         (Psi, G, G @ Psi @ transpose(G) + R, R)
-        for Psi, G, R in ((at.cov, G, R), (one, 2 * one, sharp))
+        for Psi, G, R in ((at.cov, G, R), (level, 2 * level, sharp))
     ]
 
 

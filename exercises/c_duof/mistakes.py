@@ -70,8 +70,8 @@ WRONG_REGRESSIONS = edits(
         "It is one of the best, but where the regressor never varies there are many: take the "
         "pseudo-inverse of its covariance.",
         "return matrix, offset",
-        "found = np.linalg.pinv(np.column_stack([regressor, np.ones(len(r))])) @ target; return "
-        "found[:-1].T, found[-1]",
+        "fit = np.linalg.pinv(np.column_stack([regressor, np.ones(len(r))])) @ target; return "
+        "fit[:-1].T, fit[-1]",
     ),
 )
 

@@ -53,17 +53,17 @@ def asked(name: str, *places: int) -> Callable[[Exercise], list[tuple]]:
     components, which are correlated."""
 
     def arguments(exercise: Exercise) -> list[tuple]:
-        one = hidden_estimates(exercise, name)
-        found = [one]
+        estimates = hidden_estimates(exercise, name)
+        cases = [estimates]
         if exercise.model.n == 1:
             other = hidden_estimates(exercise, f"{name}-second")
             x, first, second, _ = (
-                np.concatenate(pair[:2], axis=-1) for pair in zip(one, other, strict=True)
+                np.concatenate(pair[:2], axis=-1) for pair in zip(estimates, other, strict=True)
             )
             rng = exercise.rng(f"{name}-covariance")
             roots = (np.eye(2) + 0.4 * rng.normal(size=(*x.shape, 2))) * np.abs(x - first).mean()
-            found.append((x, first, second, roots @ transpose(roots)))
-        return [tuple(case[place] for place in places) for case in found]
+            cases.append((x, first, second, roots @ transpose(roots)))
+        return [tuple(case[place] for place in places) for case in cases]
 
     return arguments
 

@@ -40,14 +40,14 @@ def predict(posterior: Array, x: Array, move: Law) -> Array:
 
 def run_filter(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
     """Means, variances and ln p(y); a missing measurement (NaN) leaves the prediction."""
-    predicted, found, total = prior, [], np.zeros(())
+    predicted, laws, total = prior, [], np.zeros(())
     for y_k in y:
         missing = np.isnan(y_k)
         q, evidence = (predicted, 1.0) if missing else correct(predicted, y_k, x, see)
-        found.append(moments(q, x)[1:])
+        laws.append(moments(q, x)[1:])
         total = total + np.log(evidence)
         predicted = predict(q, x, move)
-    z, p = np.array(found).T
+    z, p = np.array(laws).T
     return z, p, total
 
 

@@ -108,15 +108,15 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
 def nodes_arguments(exercise: Exercise) -> list[tuple]:
     """Three intervals, widths and errors; less and more than half of a step is left: rounding to
     the nearest must show."""
-    rng, found = exercise.rng("f5"), []
+    rng, arguments = exercise.rng("f5"), []
     for exponent, part in ((3, 0.3), (6, 0.7), (9, 0.4)):
         low, high, sigma = -rng.uniform(2, 5), rng.uniform(3, 7), rng.uniform(0.002, 0.01)
         error = 10 ** -rng.uniform(exponent, exponent + 1)
         steps = (high - low) / (np.pi * sigma * np.sqrt(2 / np.log(2 / error)))
-        found.append(
+        arguments.append(
             (low, low + (high - low) * float((np.floor(steps) + part) / steps), sigma, error)
         )
-    return found
+    return arguments
 
 
 QUESTIONS = (

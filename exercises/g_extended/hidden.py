@@ -50,15 +50,15 @@ def hidden_functions(exercise: Exercise, name: str, n: int, r: int, p: int) -> F
     )
 
 
-def changing(one: Functions) -> Functions:
+def changing(functions: Functions) -> Functions:
     """The same functions times factors that change from step to step, as functions of x and k."""
 
     def times(function: Map, phase: float) -> Map:
         return of_steps(lambda x, k: (1 + 0.3 * np.sin(1.7 * k + phase)) * function(x))
 
     phases = {"f": 0.4, "Phi": 0.4, "g": 1.1, "S": 2.0, "H": 2.0, "D_n": 2.9}
-    return one._replace(
-        **{name: times(getattr(one, name), phase) for name, phase in phases.items()}
+    return functions._replace(
+        **{name: times(getattr(functions, name), phase) for name, phase in phases.items()}
     )
 
 

@@ -76,8 +76,8 @@ def bounds_arguments(exercise: Exercise) -> list[tuple]:
 def prediction_arguments(exercise: Exercise) -> list[tuple]:
     """Estimates, covariances and the functions of the object."""
     return [
-        (*hidden_law(rng, n), one.f, one.Phi, one.g, one.D_xi)
-        for one, rng, n, _ in cases(exercise, "g3")
+        (*hidden_law(rng, n), functions.f, functions.Phi, functions.g, functions.D_xi)
+        for functions, rng, n, _ in cases(exercise, "g3")
     ]
 
 
@@ -86,11 +86,20 @@ def prediction_arguments(exercise: Exercise) -> list[tuple]:
 
 def correction_arguments(exercise: Exercise) -> list[tuple]:
     """Predictions, covariances, measurements and the functions of the meter."""
-    found = []
-    for one, rng, n, p in cases(exercise, "g4"):
+    arguments = []
+    for functions, rng, n, p in cases(exercise, "g4"):
         lam, Psi = hidden_law(rng, n)
-        found.append((lam, Psi, one.S(lam) + rng.normal(size=(RUNS, p)), one.S, one.H, one.D_n))
-    return found
+        arguments.append(
+            (
+                lam,
+                Psi,
+                functions.S(lam) + rng.normal(size=(RUNS, p)),
+                functions.S,
+                functions.H,
+                functions.D_n,
+            )
+        )
+    return arguments
 
 
 # -- g5: a whole run
@@ -99,18 +108,23 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 def run_arguments(exercise: Exercise) -> list[tuple]:
     """Measurements of hidden trajectories, the prior and all functions; of the step too where the
     variant's depend on it."""
-    found = []
-    for one, rng, n, p in cases(exercise, "g5"):
-        one = changing(one) if exercise.model.timed else one
+    arguments = []
+    for functions, rng, n, p in cases(exercise, "g5"):
+        functions = changing(functions) if exercise.model.timed else functions
         mean, cov = rng.normal(size=n), covariance(rng, n, 0.6)
         x = mean + rng.normal(size=(RUNS, n)) @ np.linalg.cholesky(cov).T
         y = []
         for k in range(STEPS):
-            f, g, S, D_n = (at_step(function, k) for function in (one.f, one.g, one.S, one.D_n))
+            f, g, S, D_n = (
+                at_step(function, k)
+                for function in (functions.f, functions.g, functions.S, functions.D_n)
+            )
             y.append(S(x) + apply(root(D_n(x)), rng.normal(size=(RUNS, p))))
-            x = f(x) + apply(g(x) @ root(one.D_xi), rng.normal(size=(RUNS, len(one.D_xi))))
-        found.append((np.array(y), mean, cov, *one))
-    return found
+            x = f(x) + apply(
+                g(x) @ root(functions.D_xi), rng.normal(size=(RUNS, len(functions.D_xi)))
+            )
+        arguments.append((np.array(y), mean, cov, *functions))
+    return arguments
 
 
 # -- g6: NEES and NIS
@@ -118,17 +132,17 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
 
 def normalised_arguments(exercise: Exercise) -> list[tuple]:
     """States, estimates, predictions with their covariances, and measurements."""
-    found = []
-    for one, rng, n, p in cases(exercise, "g6"):
+    arguments = []
+    for functions, rng, n, p in cases(exercise, "g6"):
         shape = (STEPS, RUNS)
         z, lam = rng.normal(size=(2, *shape, n))
         p_, Psi = (
             np.array([[covariance(rng, n, scale) for _ in range(RUNS)] for _ in range(STEPS)])
             for scale in (0.2, 0.5)
         )
-        x, y = z + 0.4 * rng.normal(size=z.shape), one.S(lam) + rng.normal(size=(*shape, p))
-        found.append((x, z, p_, y, lam, Psi, one.S, one.H, one.D_n))
-    return found
+        x, y = z + 0.4 * rng.normal(size=z.shape), functions.S(lam) + rng.normal(size=(*shape, p))
+        arguments.append((x, z, p_, y, lam, Psi, functions.S, functions.H, functions.D_n))
+    return arguments
 
 
 # -- g7: the information form
@@ -137,15 +151,15 @@ def normalised_arguments(exercise: Exercise) -> list[tuple]:
 def information_arguments(exercise: Exercise) -> list[tuple]:
     """Information matrices, the first of them zero, and a meter with more components than the
     state."""
-    found = []
+    arguments = []
     for place, (n, p) in enumerate(((3, 4), (exercise.model.n, exercise.model.n + 1))):
         rng = exercise.rng(f"g7-{place}")
         W = np.array([covariance(rng, n, 1.5) for _ in range(RUNS)])
         W[0] = 0.0  # nothing known before
         H = rng.normal(size=(RUNS, p, n)) + np.sign(rng.normal(size=(RUNS, p, n)))
         D_n = np.array([covariance(rng, p, 0.4) for _ in range(RUNS)])
-        found.append((W, H, D_n))
-    return found
+        arguments.append((W, H, D_n))
+    return arguments
 
 
 TWO = ("z", "p")

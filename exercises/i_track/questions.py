@@ -29,7 +29,7 @@ from kfcourse.exercises.shared import covariance, personal
 
 def track_numbers(exercise: Exercise) -> dict[str, float]:
     """dt (s), sigma (px), sigma_a (px/s^2), and the number of the hand's track."""
-    found = personal(
+    numbers = personal(
         exercise,
         "i",
         dt=(0.01, 0.008, 0.02),
@@ -37,7 +37,7 @@ def track_numbers(exercise: Exercise) -> dict[str, float]:
         sigma_a=(7100.0, 4000, 9000),
         track=(7, 10, 99),
     )
-    return found | {"track": int(found["track"])}
+    return numbers | {"track": int(numbers["track"])}
 
 
 # -- i4: one step of the filter with a known input

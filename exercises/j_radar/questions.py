@@ -72,7 +72,7 @@ def several(
 
     def arguments(exercise: Exercise) -> list[tuple]:
         rng = exercise.rng(name)
-        return [tuple(float(rng.uniform(*one)) for one in limits) for _ in range(3)]
+        return [tuple(float(rng.uniform(*limit)) for limit in limits) for _ in range(3)]
 
     return arguments
 

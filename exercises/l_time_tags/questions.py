@@ -39,7 +39,7 @@ from kfcourse.exercises.shared import covariance, personal
 def timing_numbers(exercise: Exercise) -> dict[str, float]:
     """speed (m/s), acceleration (m/s^2), period, latency and jitter (s) and sigma (m) of the
     receiver, ratio of the rates."""
-    found = personal(
+    numbers = personal(
         exercise,
         "l",
         speed=(250.0, 120, 300),
@@ -50,7 +50,7 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
         sigma=(3.0, 2, 6),
         ratio=(40, 10, 60),
     )
-    return found | {"ratio": int(found["ratio"])}
+    return numbers | {"ratio": int(numbers["ratio"])}
 
 
 # -- l1: two rates in one vector; l2: two time scales

@@ -65,15 +65,15 @@ def neighbour_arguments(exercise: Exercise) -> list[tuple]:
 def step_arguments(exercise: Exercise) -> list[tuple]:
     """One step back of two components; the smoothed covariance is below the predicted one."""
     rng = exercise.rng("m4")
-    found = []
+    arguments = []
     for _ in range(2):
         p, A, Q = _system(rng)
         z = rng.normal(size=2) + 2
         Psi = A @ p @ A.T + Q
         later_p = np.linalg.inv(np.linalg.inv(Psi) + np.linalg.inv(covariance(rng, 2)))
         S = p @ A.T @ np.linalg.inv(Psi)
-        found.append((z, p, A @ z, Psi, A @ z + rng.normal(size=2) + 0.7, later_p, S))
-    return found
+        arguments.append((z, p, A @ z, Psi, A @ z + rng.normal(size=2) + 0.7, later_p, S))
+    return arguments
 
 
 def record_arguments(exercise: Exercise) -> list[tuple]:
@@ -105,11 +105,11 @@ def round_arguments(exercise: Exercise) -> list[tuple]:
 def weight_arguments(exercise: Exercise) -> list[tuple]:
     """Two measurements of two components, of a state of three: one that fits, one far off."""
     rng = exercise.rng("m7")
-    found = []
+    arguments = []
     for far in (1.0, 5.0):
         G = np.array([[1.0, 0.4, -0.6], [-0.3, 1.2, 0.5]]) + 0.1 * rng.normal(size=(2, 3))
         R = np.array([[1.0, 0.5], [0.5, 0.8]]) * rng.uniform(0.5, 0.8)
-        found.append(
+        arguments.append(
             (
                 far * (np.array([0.9, -0.7]) + 0.2 * rng.random(2)),
                 R,
@@ -118,7 +118,7 @@ def weight_arguments(exercise: Exercise) -> list[tuple]:
                 float(rng.uniform(3, 6)),
             )
         )
-    return found
+    return arguments
 
 
 QUESTIONS = (

@@ -94,13 +94,13 @@ def measured(exercise: Exercise) -> list[tuple]:
 def two_measurements(exercise: Exercise) -> list[tuple]:
     """A meter that is sound or faulty, and one that may fail in two ways."""
     rng = exercise.rng("o3")
-    found = []
+    arguments = []
     for size in (2, 3):
         y = rng.uniform(2, 5) * np.array([1.0, -0.3])
         C = np.linspace(1, 3, size) * rng.uniform(0.8, 1.2, size)
         numbers = [rng.uniform(*limits) for limits in ((0.5, 1.5), (2, 4), (0.6, 0.9), (0.3, 0.8))]
-        found.append((y, *numbers, C, transitions(rng, size), probabilities(rng, size)))
-    return found
+        arguments.append((y, *numbers, C, transitions(rng, size), probabilities(rng, size)))
+    return arguments
 
 
 def to_merge(exercise: Exercise) -> list[tuple]:

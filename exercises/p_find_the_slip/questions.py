@@ -41,37 +41,39 @@ def ensemble(rng: np.random.Generator, n: int) -> Array:
 def errors(exercise: Exercise) -> list[tuple]:
     """The filter's errors and its corrections, of one component and of two."""
     rng = exercise.rng("p6")
-    found = []
+    arguments = []
     for n in (1, 2):
         sigma = ensemble(rng, n)
-        found.append(
+        arguments.append(
             (
                 sigma @ (0.6 * np.eye(n) + 0.3 * rng.normal(size=(n, n))) + 0.4 * ensemble(rng, n),
                 sigma,
             )
         )
-    return found
+    return arguments
 
 
 def steps(exercise: Exercise) -> list[tuple]:
     """x_0, x_k and z_k: the state has moved, and z follows it."""
     rng = exercise.rng("p7")
-    found = []
+    arguments = []
     for n in (1, 2):
         x_0 = ensemble(rng, n)
         x = 0.7 * x_0 + ensemble(rng, n)
-        found.append((x_0, x, 0.8 * x + 0.5 * ensemble(rng, n) - 1))
-    return found
+        arguments.append((x_0, x, 0.8 * x + 0.5 * ensemble(rng, n) - 1))
+    return arguments
 
 
 def modes(exercise: Exercise) -> list[tuple]:
     """Two modes that are not equally frequent; three, one of which nobody is in."""
     rng = exercise.rng("p8")
-    found = []
+    arguments = []
     for present in ((0, 1), (0, 2)):
         mode = rng.choice(present, RUNS, p=(0.7, 0.3))
-        found.append((rng.uniform(1, 2) + 2.0 * mode + (0.5 + mode) * rng.normal(size=RUNS), mode))
-    return found
+        arguments.append(
+            (rng.uniform(1, 2) + 2.0 * mode + (0.5 + mode) * rng.normal(size=RUNS), mode)
+        )
+    return arguments
 
 
 def symbols(names: str) -> list[tuple]:

@@ -84,10 +84,6 @@ class Underway(NamedTuple):
         """As of `PointMass`, (runs,): that of all sub-steps is in it."""
         return self.posterior.error
 
-    def evidence_error(self) -> Array:
-        """Estimated error of ln p(y_k | y_0, ..., y_{k-1}), (runs,)."""
-        return self.posterior.evidence_error()
-
     def discretisation_error(self) -> Array:
         """Estimated error of the posterior means, (runs,), in the units of x."""
         return self.posterior.discretisation_error()

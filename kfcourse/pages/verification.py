@@ -246,14 +246,14 @@ def _must_agree(
     unit = sp.Float(10) ** -digits
     free = sorted((left.free_symbols | right.free_symbols), key=str)
     for point in _points(free) if at is None else at:
-        one, other = (sp.N(side.subs(point).doit(), digits + 15) for side in (left, right))
-        if not (one.is_number and other.is_number):
+        first, other = (sp.N(side.subs(point).doit(), digits + 15) for side in (left, right))
+        if not (first.is_number and other.is_number):
             raise ValueError(
-                f"at {point} no number is left but {one} and {other}: `at` gives every symbol a "
+                f"at {point} no number is left but {first} and {other}: `at` gives every symbol a "
                 f"value"
             )
-        if not abs(one - other) <= unit * max(abs(one), abs(other), unit):
-            numbers = f"the left side is {sp.N(one, digits)}, the right {sp.N(other, digits)}"
+        if not abs(first - other) <= unit * max(abs(first), abs(other), unit):
+            numbers = f"the left side is {sp.N(first, digits)}, the right {sp.N(other, digits)}"
             raise Unverified(f"at {point} {numbers}\n  left:  {left}\n  right: {right}")
 
 

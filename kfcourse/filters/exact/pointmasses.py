@@ -101,11 +101,6 @@ class PointMass(NamedTuple):
         x = 0.5 * (middle[:, None] + size[:, None] * POINT)
         return x.ravel(), np.exp(rows[:, :Q]).ravel() * self.probability[run, mode]
 
-    def evidence_error(self) -> Array:
-        """Estimated error of `log_likelihood`, (runs,): a density's total errs by no more than it
-        does."""
-        return self.error
-
     def discretisation_error(self) -> Array:
         """Estimated error of the posterior means, (runs,), in the units of x."""
         return self.error * np.sqrt(self.variance)
