@@ -177,8 +177,8 @@ def exact(name):
 def comparison(name):
     """Error variances of the lab's filters, and their standard errors."""
     model = PLAIN[name]
-    found = compare(lab_filters(model), model, 20_000, 10, seed=1, progress=False)
-    variances = {short: found.error_variance(short) for short in LAB}
+    result = compare(lab_filters(model), model, 20_000, 10, seed=1, progress=False)
+    variances = {short: result.error_variance(short) for short in LAB}
     return {short: np.array([each.value, each.standard_error]) for short, each in variances.items()}
 
 
