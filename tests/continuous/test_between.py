@@ -506,7 +506,7 @@ def test_what_such_models_are_not_for():
 @pytest.mark.parametrize("drift", ["x**3", "-500*x"])
 def test_trajectories_that_leave_all_bounds_are_named(drift):
     """The second by its sub-steps alone: each multiplies the state."""
-    with pytest.raises(NotFinite, match="a trajectory passes 1e.100: .*give more `substeps`"):
+    with pytest.raises(NotFinite, match=r"a trajectory passes 1e.100: .*give more `substeps`"):
         simulate(sampled(drift, "1", "x + w", substeps=10), runs=5, steps=16, seed=1)
 
 
