@@ -13,10 +13,10 @@ from pathlib import Path
 
 from docutils import nodes
 from equations import BEYOND, COURSE
-from figures import ancestors
 from gate.page import Formula, Letters, Verdict, letters_file, letters_of, mark
 from sphinx.util import logging
 
+from ext.figures import ancestors
 from kfcourse.pages import Unverified
 
 BOXES = {"algorithm", "definition"}

@@ -15,12 +15,13 @@ from typing import NamedTuple
 import contents
 from docutils import nodes
 from equations import BEYOND, COURSE
-from figures import ancestors
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.docutils import SphinxDirective
 
+from ext.figures import ancestors
+
 PAGE = "glossary"
-GLOSSARY = Path(__file__).with_name("glossary.toml")
+GLOSSARY = Path(__file__).resolve().parents[1] / "glossary.toml"
 RUSSIAN = re.compile(r"[а-яё]", re.IGNORECASE)
 NOT_LINKED = (
     nodes.reference, nodes.title, nodes.literal, nodes.math, nodes.raw, nodes.caption, nodes.figure,
