@@ -60,11 +60,23 @@ LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 RUNS = 20_000  # trajectories
 
 
+PATH = click.Path(path_type=Path)
 VARIANTS = click.option(
-    "--variants",
-    "variants_file",
-    type=click.Path(path_type=Path),
-    help="Another TOML file of variants.",
+    "--variants", "variants_file", type=PATH, help="Another TOML file of variants."
+)
+SEED = click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=1,
+    show_default=True,
+    help="The same seed gives the same numbers.",
+)
+JOBS = click.option(
+    "--jobs",
+    "--threads",
+    "jobs",
+    type=click.IntRange(min=1),
+    help="Processor cores to use; does not change the numbers.  [default: all]",
 )
 
 
@@ -143,13 +155,7 @@ def main() -> None:
     type=click.IntRange(min=1),
     help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=1,
-    show_default=True,
-    help="The same seed gives the same numbers.",
-)
+@SEED
 @click.option(
     "--filters",
     "names",
@@ -169,17 +175,9 @@ def main() -> None:
     is_flag=True,
     help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.",
 )
-@click.option(
-    "--jobs",
-    "--threads",
-    "jobs",
-    type=click.IntRange(min=1),
-    help="Processor cores to use; does not change the numbers.  [default: all]",
-)
+@JOBS
 @click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]"
-)
+@click.option("--out", type=PATH, help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report",
     "language",
@@ -196,7 +194,7 @@ def main() -> None:
 @click.option(
     "--json",
     "json_file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Also write the numbers to this file; - is standard output.",
 )
 def lab(
@@ -331,13 +329,7 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
     type=click.IntRange(1, 200),
     help="Propose so many new variants that are well posed.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=1,
-    show_default=True,
-    help="Of the trajectories and proposals.",
-)
+@SEED
 @click.option(
     "--runs",
     type=click.IntRange(min=FEWEST),
@@ -345,12 +337,10 @@ def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
     show_default=True,
     help="Trajectories of a check, an eighth for vectors.",
 )
-@click.option(
-    "--jobs", type=click.IntRange(min=1), help="Does not change the results.  [default: all cores]"
-)
+@JOBS
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="New file for the proposed variants.  [default: print them]",
 )
 def variants(
@@ -419,7 +409,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 
 
 @main.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @VARIANTS
 @click.option(
     "--variant", help="Of which the derivation is; a heading of the file may name it as well."
@@ -465,11 +455,11 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
 
 
 @main.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.option(
     "--model",
     "model_file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     required=True,
     help="TOML file with the model.",
 )
@@ -517,9 +507,7 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
 @click.option(
     "--track", metavar="X,Y", help="Two components of the state, drawn against each other."
 )
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: estimate-FILE]"
-)
+@click.option("--out", type=PATH, help="Folder of the report.  [default: estimate-FILE]")
 def estimate(
     file: Path,
     model_file: Path,

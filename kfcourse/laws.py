@@ -254,6 +254,16 @@ def square_root(cov: Matrices) -> Matrices:
     return vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
 
 
+def is_covariance(cov: Array) -> bool:
+    """Whether a symmetric matrix has no negative eigenvalue, in whatever units its components
+    are."""
+    variances = cov.diagonal()
+    scale = 1 / np.sqrt(np.where(variances > 0, variances, 1.0))
+    correlations = cov * scale[:, None] * scale
+    rounding = 1e-12 * len(cov)  # of eigvalsh, and of a covariance that was itself computed
+    return bool((variances >= 0).all() and np.linalg.eigvalsh(correlations).min() >= -rounding)
+
+
 def normalised_square(vector: Vectors, cov: Matrices) -> Array:
     """vector^T cov^+ vector: (..., n), (..., n, n) -> (...); NaN where a component is NaN.
 
@@ -273,17 +283,10 @@ def log_density(measurement: Measurement, y: Vectors) -> Array:
     if any_missing(innovation):
         present = (~np.isnan(innovation)).sum(axis=-1)
         innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
-    return -0.5 * (
-        normalised_square(innovation, F) + _log_determinant(F) + present * np.log(2 * np.pi)
-    )
-
-
-def _log_determinant(cov: Matrices) -> Array:
-    """ln |det cov|, (...), -inf where it is singular; of one component without a factorisation."""
-    if cov.shape[-1] > 1:
-        return np.linalg.slogdet(cov).logabsdet
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.abs(cov[..., 0, 0])))
+    with np.errstate(invalid="ignore"):  # a law that left the finite numbers has no density
+        log_determinant = np.linalg.slogdet(F).logabsdet
+    square = normalised_square(innovation, F)
+    return -0.5 * (square + log_determinant + present * np.log(2 * np.pi))
 
 
 def stacked(laws: Sequence[Gaussian]) -> Gaussian:

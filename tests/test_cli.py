@@ -103,18 +103,8 @@ def test_one_bad_variant_is_named_and_stops_no_other(call, no_report, tmp_path):
         and "Error: variant bad in mine.toml: unknown symbol 'q'" in listed.output
     )
     assert len(re.findall(r"no title", listed.output)) == 4
-    checked = call(
-        "variants",
-        "--variants",
-        "mine.toml",
-        "--variant",
-        "53",
-        "--variant",
-        "bad",
-        "--check",
-        "--runs",
-        1000,
-    )
+    words = "variants --variants mine.toml --variant 53 --variant bad --check --runs 1000"
+    checked = call(*words.split())
     assert (
         checked.exit_code == 1
         and "Error: variant bad" in checked.output
@@ -145,16 +135,13 @@ def test_the_lab_of_variant_53(call, tmp_path):
     for key in ("error_variance", "standard_error"):
         assert set(data[key]) == names
         for values in data[key].values():
-            assert len(values) == 12
-            assert all(isinstance(value, float) and math.isfinite(value) for value in values)
+            assert len(values) == 12 and all(map(math.isfinite, values))
     html = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert "<math" in html
     assert not re.search(r"""(src|href)\s*=\s*["']?\s*(https?:)?//""", html)
     images = re.findall(r'<img src="([^"]+)"', html)
     assert images
-    for image in images:
-        assert (tmp_path / "report" / image).is_file()
-    assert (tmp_path / "report" / "report.tex").is_file()
+    assert all((tmp_path / "report" / name).is_file() for name in [*images, "report.tex"])
     assert str(Path("report") / "report.html") in result.output
 
 
@@ -164,19 +151,6 @@ def test_every_filter_can_be_chosen(call, no_report, tmp_path):
     assert set(
         json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]
     ) == set(FILTERS)
-
-
-def test_a_file_of_ones_own_with_a_shipped_variant_gives_the_same_numbers(
-    call, no_report, tmp_path
-):
-    assert (
-        call(
-            "lab", "53", *QUICK, "--variants", "mine.toml", "--json", "a.json", "--out", "a"
-        ).exit_code
-        == 0
-    )
-    assert call("lab", "53", *QUICK, "--json", "b.json", "--out", "b").exit_code == 0
-    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
 def test_a_vector_variant_works(call, tmp_path):
@@ -202,14 +176,16 @@ def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, no_figures, tmp_pa
 # --- reproducibility
 
 
-def test_the_same_seed_gives_the_same_bytes_whatever_the_threads(call, no_report, tmp_path):
+def test_the_same_seed_gives_the_same_bytes_whatever_the_threads_and_the_file(
+    call, no_report, tmp_path
+):
     common = ("lab", "53", "--runs", 200, "--steps", 6, "--out", "report")
-    for name, options in {"a": (), "b": (), "c": ("--threads", 1), "d": ("--seed", 2)}.items():
-        assert call(*common, *options, "--json", f"{name}.json").exit_code == 0
-    a, b, c, d = ((tmp_path / f"{name}.json").read_bytes() for name in "abcd")
-    assert a == b
-    assert a == c
-    assert a != d
+    numbers = []
+    for options in ("", "", "--threads 1", "--variants mine.toml", "--seed 2"):
+        assert call(*common, *options.split(), "--json", "n.json").exit_code == 0
+        numbers.append((tmp_path / "n.json").read_bytes())
+    *same, other = numbers
+    assert len(set(same)) == 1 and other not in same
 
 
 # --- mistakes
@@ -314,13 +290,7 @@ def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(
         )
     numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
     assert set(numbers["left_out"]) == {"aof-gaussian", "fos-gaussian", "mfos-gaussian"}
-    assert set(numbers["error_variance"]) == {
-        "aof-linearised",
-        "duof",
-        "fos-linearised",
-        "mfos-linearised",
-        "aof-exact",
-    }
+    assert set(numbers["error_variance"]) == {*LAB, "aof-exact"} - set(numbers["left_out"])
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
     assert "<td>GAOF</td><td>no</td>" in page and "Which filters this model admits" in page
     assert "<td>UKF</td>" in page and "<td>GHKF</td>" in page
@@ -330,15 +300,10 @@ def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(
 def test_filters_lists_which_are_admissible(call):
     result = call("filters", "mine.toml", "tan")
     assert result.exit_code == 0
-    lines = {
-        line.split()[0]: line for line in result.output.splitlines() if line.split()[0] in FILTERS
-    }
-    assert list(lines) == list(FILTERS)
-    assert (
-        " no " in lines["aof-gaussian"]
-        and "tan(x)" in lines["aof-gaussian"]
-        and lines["duof"].split()[-1] == "yes"
-    )
+    lines = {line.split()[0]: line for line in result.output.splitlines()}
+    assert [name for name in lines if name in FILTERS] == list(FILTERS)
+    assert re.search(r" no .*tan\(x\)", lines["aof-gaussian"])
+    assert lines["duof"].endswith("yes")
     assert call("filters", "tan", "--variants", "mine.toml").output == result.output
     assert "aof-exact" in call("filters", "53").output
     refused(call("filters", "nothing.toml", "tan"), "nothing.toml")
@@ -347,21 +312,10 @@ def test_filters_lists_which_are_admissible(call):
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize(
-    "option",
-    [
-        ("--runs", "1"),
-        ("--runs", "many"),
-        ("--steps", "0"),
-        ("--seed", "-1"),
-        ("--threads", "0"),
-    ],
-)
+@pytest.mark.parametrize("option", ["--runs 1", "--steps 0", "--seed -1", "--threads 0"])
 def test_impossible_numbers_are_refused(call, no_computation, option):
-    result = call("lab", "53", *option)
-    assert result.exit_code == 2
-    assert option[0] in result.output
-    assert "Traceback" not in result.output
+    result = call("lab", "53", *option.split())
+    assert result.exit_code == 2 and option.split()[0] in result.output
 
 
 def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(
@@ -404,10 +358,8 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(
     call, no_figures, tmp_path, monkeypatch
 ):
     """Of both reports: what is new appears when all of it is written."""
-    assert (
-        call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code
-        == 0
-    )
+    common = ("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru")
+    assert call(*common).exit_code == 0
     before = snapshot(tmp_path)
 
     def ended(*arguments):
@@ -415,12 +367,7 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "write_report", ended)
-    assert (
-        call(
-            "lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r", "--report", "ru"
-        ).exit_code
-        == 130
-    )
+    assert call(*common, "--seed", 2).exit_code == 130
     assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
 
 

@@ -12,6 +12,7 @@ from kfcourse.laws import (
     apply,
     correct,
     gain,
+    is_covariance,
     log_density,
     product,
     square_root,
@@ -185,3 +186,29 @@ def test_the_log_density_is_the_normal_law_s_of_what_was_measured():
     y[0, 0] = np.nan
     assert log_density(measurement, y) == pytest.approx([-0.5 * (1.2**2 / 1.0 + np.log(2 * np.pi))])
     assert log_density(measurement, np.full((1, 2), np.nan)) == pytest.approx([0.0])
+
+
+@pytest.mark.parametrize(
+    ("cov", "right"),
+    [
+        ([[1.0, 0.5], [0.5, 1.0]], True),
+        ([[1.0, 1.0], [1.0, 1.0]], True),  # singular
+        ([[0.0, 0.0], [0.0, 1.0]], True),
+        ([[1.0, 1.5], [1.5, 1.0]], False),
+        ([[0.0, 0.1], [0.1, 1.0]], False),  # what does not vary is correlated with nothing
+        ([[1e10, 0.0], [0.0, -1e-3]], False),  # not to be taken for rounding of the other component
+        ([[1e10, 1.001], [1.001, 1e-10]], False),  # a correlation above 1, in very different units
+        ([[1e10, 1.0], [1.0, 1e-10]], True),
+    ],
+)
+def test_a_covariance_is_one_in_any_units(cov, right):
+    assert is_covariance(np.array(cov)) is right
+
+
+def test_products_of_a_random_root_are_covariances():
+    rng = np.random.default_rng(1)
+    for size in range(1, 8):
+        root = rng.standard_normal((size, max(size - 1, 1))) * 10.0 ** rng.uniform(
+            -20, 20, (size, 1)
+        )
+        assert is_covariance(root @ root.T)

@@ -33,7 +33,8 @@ from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.known import Known
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments
-from kfcourse.symbolic.structure import Structure, gaussian, gaussian_symbols, linearised
+from kfcourse.symbolic.sides import gaussian_symbols
+from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
 # trajectories that may be stiff: the implicit method takes some hundredths of a second each
 FEW = 64

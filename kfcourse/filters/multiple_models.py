@@ -353,7 +353,7 @@ def by_state(model: JumpModel) -> Links:
             f"on at most {max(ORDER)}, or make one number of the state on which they depend a "
             f"component of its own"
         )
-    nodes, weights = product_rule(ORDER[len(used)])(len(used))
+    nodes, weights = product_rule(ORDER[len(used)], len(used))
 
     def weighted(i: int, law: Gaussian, k: int) -> tuple[Array, list[Gaussian]]:
         """nu_ij (runs, J), and N(z_ij, p_ij) for each j."""

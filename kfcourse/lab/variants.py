@@ -14,9 +14,8 @@ from typing import Any
 from kfcourse.continuous.sampling import sampled_of_table
 from kfcourse.errors import expect_sizes
 from kfcourse.symbolic.jumping import JumpModel, model_of_table
-from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.model import Model, nothing_random
 from kfcourse.symbolic.reading import shown
-from kfcourse.symbolic.sense import nothing_random
 
 SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
 KEYS = {

@@ -13,7 +13,7 @@ not shrink with the record.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -86,7 +86,7 @@ def _normal_filter(model: Model) -> Filter:
 
 
 def estimate(
-    model: Model | Mapping[str, Any],
+    model: Model,
     y: Array,
     unknown: Sequence[str],
     positive: Sequence[str] = (),
@@ -96,7 +96,7 @@ def estimate(
 
     Parameters
     ----------
-    model : Model, or a table as of [variants.NAME]
+    model : Model
         Its values are where the search begins.  Variances are parameters too:
         `meter_noise={"variance": "r"}`.
     y : ndarray (steps, runs, p)
@@ -128,8 +128,7 @@ def estimate(
     >>> [round(value, 1) for value in found.value.tolist()], round(found.log_likelihood, 4)
     ([1468.5, 15099.7], -641.5856)
     """
-    expect(model, Model, "estimate", Mapping)
-    model = model if isinstance(model, Model) else Model.of_table(model)
+    expect(model, Model, "estimate")
     names, logs, start = _checked(model, unknown, positive)
 
     def parameters(t: Array) -> Array:

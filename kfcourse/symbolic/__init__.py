@@ -9,9 +9,9 @@ model        `Model`: object, meter, noises, prior;  jumping: `JumpModel`, sever
 equations    its two equations as functions of arrays
 choices      functions with kinks and jumps
 moments      exact moments of functions of normal variables
-structure    structural functions tau, Theta, h, G, F, derived: `linearised`, `gaussian`
+sides        object and meter at a normal law, in symbols; where derivations by hand start, too
+structure    structural functions tau, Theta, h, G, F, derived from these: `linearised`, `gaussian`
 quadrature   the same by quadrature: `unscented`, `gauss_hermite`;  averaging: averaged over modes
-sides        object and meter at a normal law, in symbols: what derivations by hand start from
 codegen      expressions -> NumPy over the ensemble; the only place where formulas become code
 javascript   the same programs as JavaScript, for the pages
 """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,30 +34,41 @@ def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list
     return Angles(*(tuple(sorted(places[kind])) for kind in components))
 
 
-def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:
-    """AngleWarning for components that are circular by atan2 and may pass from pi to -pi."""
-    if circular := [name for name, equation in equations.items() if _jumps(equation)]:
-        _warn(
-            f"{' and '.join(circular)}: atan2 jumps from pi to -pi, and a filter takes the jump "
-            f"for an innovation of a turn; "
-            f"say angles=[{_quoted(circular)}], or angles=[] if it is no angle or never comes "
-            f"near pi"
-        )
-
-
-def warn_of_meters(measured: Mapping[str, sp.Expr], angles: Angles, x: Sequence[sp.Symbol]) -> None:
-    """AngleWarning for measurements that contain an angle as it is, and are not said to be angles
-    themselves."""
-    turning = [x[i] for i in angles.x]
-    for i, (name, equation) in enumerate(measured.items()):
-        plain = [symbol for symbol in turning if _outside_sines(equation, symbol)]
-        if plain and i not in angles.y:
-            state = _quoted([symbol.name for symbol in turning])
-            _warn(
-                f"{name} contains the angle {plain[0]}, which jumps from pi to -pi, outside sin "
-                f"and cos: say "
-                f'angles={{"x": [{state}], "y": ["{name}"]}}, or "y": [] if it is no angle'
-            )
+def warn_of_angles(
+    given: Names | Mapping[str, Names] | None,
+    angles: Angles,
+    state: Mapping[str, sp.Expr],
+    meter: Mapping[str, sp.Expr],
+) -> None:
+    """AngleWarning for components that are circular by atan2 and may pass from pi to -pi, where
+    nothing is said of angles, and for measurements that contain an angle as it is, where nothing is
+    said of them."""
+    if given is None:
+        for equations in (state, meter):
+            # an atan2 of a point to the right jumps nowhere
+            if circular := [
+                name
+                for name, equation in equations.items()
+                if any(
+                    isinstance(part, sp.atan2) and not part.args[1].is_nonnegative
+                    for part in _outside_sines(equation)
+                )
+            ]:
+                _warn(
+                    f"{' and '.join(circular)}: atan2 jumps from pi to -pi, and a filter takes the "
+                    f"jump for an innovation of a turn; say angles=[{_quoted(circular)}], or "
+                    f"angles=[] if it is no angle or never comes near pi"
+                )
+    elif not (isinstance(given, Mapping) and "y" in given):
+        turning = [[*state][i] for i in angles.x]
+        for i, (name, equation) in enumerate(meter.items()):
+            plain = [str(part) for part in _outside_sines(equation) if str(part) in turning]
+            if plain and i not in angles.y:
+                _warn(
+                    f"{name} contains the angle {plain[0]}, which jumps from pi to -pi, outside "
+                    f'sin and cos: say angles={{"x": [{_quoted(turning)}], "y": ["{name}"]}}, or '
+                    f'"y": [] if it is no angle'
+                )
 
 
 def warn_of_degrees(what: str, values: Any, names: Sequence[str], angles: Components) -> None:
@@ -80,18 +91,9 @@ def _quoted(names: Sequence[str]) -> str:
     return ", ".join(f'"{name}"' for name in names)
 
 
-def _outside_sines(formula: sp.Expr, angle: sp.Symbol) -> bool:
-    """Whether the angle stands in it outside sine, cosine and tangent."""
-    if isinstance(formula, sp.sin | sp.cos | sp.tan):
-        return False
-    return formula == angle or any(_outside_sines(argument, angle) for argument in formula.args)
-
-
-def _jumps(formula: sp.Expr) -> bool:
-    """Whether an atan2 in it may pass from pi to -pi: not of a point to the right, nor inside a
-    sine."""
-    if isinstance(formula, sp.sin | sp.cos | sp.tan):
-        return False
-    if isinstance(formula, sp.atan2) and not formula.args[1].is_nonnegative:
-        return True
-    return any(_jumps(argument) for argument in formula.args)
+def _outside_sines(formula: sp.Basic) -> Iterator[sp.Basic]:
+    """Its parts that stand outside sine, cosine and tangent."""
+    if not isinstance(formula, sp.sin | sp.cos | sp.tan):
+        yield formula
+        for argument in formula.args:
+            yield from _outside_sines(argument)

@@ -13,19 +13,18 @@ from sympy.core.relational import Relational
 def by_indicators(formula: sp.Expr, variables: Sequence[sp.Symbol]) -> sp.Expr:
     """The formula with a sum, of branches times what is 1 where they hold, for each choice that the
     variables do not decide, such as Piecewise((x, t < 45), (0, True)): a polynomial in x."""
-    if not (formula.has(sp.Piecewise) and formula.has(*variables)):
-        return formula
-    if isinstance(formula, sp.Piecewise) and not decides(formula, variables):
-        conditions = [condition for _, condition in formula.args]
-        indicators = (
-            sp.Piecewise(
-                *((sp.Integer(i == j), condition) for j, condition in enumerate(conditions))
-            )
-            for i in range(len(conditions))
+
+    def summed(choice: sp.Piecewise) -> sp.Expr:
+        conditions = [condition for _, condition in choice.args]
+        return sum(
+            branch * sp.Piecewise(*((int(other is holds), other) for other in conditions))
+            for branch, holds in choice.args
         )
-        branches = (by_indicators(branch, variables) for branch, _ in formula.args)
-        return sp.Add(*(a * b for a, b in zip(branches, indicators, strict=True)))
-    return formula.func(*(by_indicators(argument, variables) for argument in formula.args))
+
+    return formula.replace(
+        lambda e: isinstance(e, sp.Piecewise) and e.has(*variables) and not decides(e, variables),
+        summed,
+    )
 
 
 def decides(formula: sp.Basic, variables: Sequence[sp.Symbol]) -> bool:

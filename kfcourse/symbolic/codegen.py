@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
@@ -91,10 +91,14 @@ def _compiled(
                 "give it a value, or make it an argument"
             )
     renamed = {key: place[0] for key, place in places.items()}
-    varying = [matrix.xreplace(renamed) for _, matrix in outputs if matrix.free_symbols]
-    used = set().union(*(matrix.free_symbols for matrix in varying))
+    entries = [
+        _in_floats(entry.xreplace(renamed))
+        for _, matrix in outputs
+        for entry in matrix
+        if not entry.is_number
+    ]
+    used = set().union(*(entry.free_symbols for entry in entries))
     taken = [place for place in places.values() if place[0] in used]
-    entries = [_in_floats(entry) for matrix in varying for entry in matrix if not entry.is_number]
     formulas = sp.lambdify(
         [symbol for symbol, *_ in taken], entries, ["scipy", "numpy"], cse=_shared
     )
@@ -152,25 +156,21 @@ def _assembler(
     """Puts the entries of one output together, the values of those that vary from an iterator."""
     indices = [(i,) if is_vector else (i, j) for i, j in product(*map(range, matrix.shape))]
     constant = np.zeros(matrix.shape[:1] if is_vector else matrix.shape)
+    varying = []
     for index, entry in zip(indices, matrix, strict=True):
-        constant[index] = float(entry) if entry.is_number else 0.0
-    varying = [index for index, entry in zip(indices, matrix, strict=True) if not entry.is_number]
-    enter = [
-        number
-        for number, (_, m) in enumerate(arguments)
-        if is_vector or m.free_symbols & matrix.free_symbols
-    ]
+        if entry.is_number:
+            constant[index] = float(entry)
+        else:
+            varying.append(index)
+    enter = [is_vector or bool(m.free_symbols & matrix.free_symbols) for _, m in arguments]
 
     def assemble(values: Any, leads: list[tuple[int, ...]]) -> Array:
-        if not varying:
-            return constant.copy()
-        if len(indices) == 1:  # no copy of the one component
-            return np.asarray(next(values))[(..., *(None for _ in constant.shape))]
-        result = np.empty(
-            np.broadcast_shapes(*(leads[number] for number in enter)) + constant.shape
-        )
-        if len(varying) < len(indices):
-            result[...] = constant
+        lead = np.broadcast_shapes(*compress(leads, enter))
+        if varying and constant.size == 1:  # no copy of the one component
+            value = np.broadcast_to(next(values), lead)
+            return value[(..., *(None for _ in constant.shape))]
+        result = np.empty(lead + constant.shape)
+        result[...] = constant
         for index in varying:
             result[(..., *index)] = next(values)
         return result

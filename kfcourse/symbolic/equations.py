@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import TypeAlias
 
 import sympy as sp
 
@@ -10,19 +11,11 @@ from kfcourse.laws import Array
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 
-
-class Equation(Protocol):
-    """a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends
-    on the step, at step k."""
-
-    def __call__(self, x: Array, noise: Array, k: int | None = None) -> Array: ...
-
-
-class Noiseless(Protocol):
-    """a(x, m_v) or b(x, m_w), x (..., n) -> (..., n) or (..., p); of a model that depends on the
-    step, at step k."""
-
-    def __call__(self, x: Array, k: int | None = None) -> Array: ...
+# a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends on
+# the step, at step k: equation(x, v, k).
+Equation: TypeAlias = Callable[..., Array]
+# a(x, m_v) or b(x, m_w), x (..., n) -> (..., n) or (..., p), and with the step
+Noiseless: TypeAlias = Callable[..., Array]
 
 
 def compile_model(model: Model) -> tuple[Equation, Equation]:
@@ -30,11 +23,10 @@ def compile_model(model: Model) -> tuple[Equation, Equation]:
 
     Those of a model that depends on the step need it: `state(x, v, k)`.
     """
-    meter = _compiled("meter", model.meter_equation, {"x": model.x, "w": model.w}, model)
+    meter = _compiled("meter", model.meter_equation, "w", model.w, model)
     if model.between is not None:
-        return model.between.motion(model), lambda x, w, k=None: meter.at(k)(x, w)[0]
-    state = _compiled("state", model.state_equation, {"x": model.x, "v": model.v}, model)
-    return lambda x, v, k=None: state.at(k)(x, v)[0], lambda x, w, k=None: meter.at(k)(x, w)[0]
+        return model.between.motion(model), meter
+    return _compiled("state", model.state_equation, "v", model.v, model), meter
 
 
 def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
@@ -46,8 +38,9 @@ def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
 
 
 def _compiled(
-    name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model
-) -> Stepwise:
-    matrices = {key: sp.Matrix(symbols) for key, symbols in arguments.items()}
-    numeric = equation.subs(model.values)
-    return Stepwise.compile(model.known, name, matrices, {name: numeric}, [*arguments, name])
+    name: str, equation: sp.MatrixBase, letter: str, noise: tuple[sp.Symbol, ...], model: Model
+) -> Equation:
+    arguments = {"x": sp.Matrix(model.x), letter: sp.Matrix(noise)}
+    numeric = {name: equation.subs(model.values)}
+    function = Stepwise.compile(model.known, name, arguments, numeric, [*arguments, name])
+    return lambda x, noise, k=None: function.at(k)(x, noise)[0]

@@ -13,7 +13,7 @@ import operator
 import re
 import unicodedata
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -35,8 +35,6 @@ OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
 ARITHMETIC, COMPARISONS = tuple(OPERATORS)[:4], tuple(OPERATORS)[8:]
 
 NO_NUMBERS = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
-# numbers beyond it, or below 1/LARGEST: products of some would leave the floats
-LARGEST = sp.Integer(10) ** 100
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
 MAX_DEGREE = 24
@@ -107,7 +105,7 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
     except TypeError:  # SymPy's, where numbers that are not real are compared
         raise FormulaError(formula, "the formula compares what has no real value") from None
-    if _degree(expression) > MAX_DEGREE:
+    if degree(expression) > MAX_DEGREE:
         raise FormulaError(
             formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it"
         )
@@ -128,15 +126,9 @@ def syntax(formula: str) -> tuple[str, ast.expr, int]:
     FormulaError
         It is too long, has characters that formulas have not, or is no expression of Python.
     """
-    if not isinstance(formula, str):
+    if not isinstance(formula, str) or not formula.strip() or len(formula) > MAX_LENGTH:
         raise FormulaError(
-            str(formula), f"a formula must be a string, got {type(formula).__name__}"
-        )
-    if not formula.strip():
-        raise FormulaError(formula, "the formula is empty")
-    if len(formula) > MAX_LENGTH:
-        raise FormulaError(
-            formula, f"the formula has {len(formula)} characters; at most {MAX_LENGTH} are read"
+            str(formula), f"a formula is a text, not empty, of at most {MAX_LENGTH} characters"
         )
     formula = re.sub(r"[\t\n\r]", " ", formula)  # of a text over several lines
     _check_characters(formula)
@@ -228,17 +220,14 @@ class Reader:
         )
 
     def number(self, node: ast.Constant) -> sp.Expr:
-        if type(node.value) not in (int, float):
+        if isinstance(node.value, bool) or not isinstance(node.value, int | float):
             raise self.fail(node, f"{node.value!r} is not a real number")
-        written = ast.get_source_segment(self.formula[self.offset :], node) or ""
-        # as written, since 1e-400 is 0 as a float
-        value = sp.Rational(node.value if isinstance(node.value, int) else written.replace("_", ""))
-        if value and not 1 / LARGEST < abs(value) < LARGEST:
+        if node.value and not 1e-100 < abs(node.value) < 1e100:
             raise self.fail(
                 node,
                 "the number is too large or too small (1e-100 to 1e100 are read): change the units",
             )
-        return value
+        return sp.Rational(str(node.value))
 
     def name(self, node: ast.Name) -> sp.Expr:
         known = self.symbols | CONSTANTS
@@ -255,24 +244,17 @@ class Reader:
 
     def power(self, node: ast.BinOp) -> sp.Expr:
         base, exponent = self.read(node.left), self.read(node.right)
-        if exponent.free_symbols or not exponent.is_Rational:
+        if not exponent.is_Rational or abs(exponent) > MAX_EXPONENT:
             raise self.fail(
-                node.right, "an exponent must be a plain number; write exp(...) for exponentials"
+                node.right,
+                f"an exponent must be a plain number, at most {MAX_EXPONENT}; write exp(...) for "
+                f"exponentials",
             )
-        if abs(exponent) > MAX_EXPONENT:
-            raise self.fail(node.right, f"the exponent is larger than {MAX_EXPONENT}")
         if base.is_number and base.is_negative and not exponent.is_Integer:
             raise self.fail(node, "a root of a negative number has no real value")
-        if base.is_number and (
-            abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)
-        ):
+        if base.is_number and base and not 1 / MAX_NUMBER < abs(base) < MAX_NUMBER:
             raise self.fail(node, "the power of this number is too large or too small")
-        result = base**exponent
-        if _degree(result) > MAX_DEGREE:
-            raise self.fail(
-                node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula"
-            )
-        return result
+        return base**exponent
 
     def condition(self, node: ast.expr) -> Boolean:
         match node:
@@ -311,19 +293,24 @@ class Reader:
         self.nested += 1
         arguments = [self.read(argument) for argument in node.args]
         self.nested -= 1
-        if any(argument.has(*NO_NUMBERS) for argument in arguments):
-            raise self.fail(node, f"the argument of {node.func.id} has no finite real value")
-        if any(argument.is_number and abs(argument) >= MAX_ARGUMENT for argument in arguments):
-            raise self.fail(node, f"the argument of {node.func.id} is too large")
+        if any(
+            argument.has(*NO_NUMBERS) or (argument.is_number and abs(argument) >= MAX_ARGUMENT)
+            for argument in arguments
+        ):
+            raise self.fail(
+                node, f"the argument of {node.func.id} is too large, or has no finite real value"
+            )
         return FUNCTIONS[node.func.id](*arguments)
 
 
-def _degree(expression: sp.Expr) -> int:
-    """A bound on the degree the expression would have if its integer powers were expanded."""
+def degree(expression: sp.Expr, variables: Sequence[sp.Symbol] = ()) -> int:
+    """A bound on the degree the expression would have if its integer powers were expanded; with
+    variables in them, outside exponentials."""
+    if variables and (isinstance(expression, sp.exp) or not expression.has(*variables)):
+        return 0
     if expression.is_Pow and expression.exp.is_Integer:
-        return int(abs(expression.exp)) * _degree(expression.base)
-    if expression.is_Mul:
-        return sum(_degree(factor) for factor in expression.args)
+        return int(abs(expression.exp)) * degree(expression.base, variables)
     if expression.args:
-        return max(_degree(argument) for argument in expression.args)
+        each = (degree(argument, variables) for argument in expression.args)
+        return sum(each) if expression.is_Mul else max(each)
     return int(bool(expression.free_symbols))

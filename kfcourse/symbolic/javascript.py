@@ -36,36 +36,10 @@ class inverse(sp.Function):
     is_real = True
 
 
-FUNCTIONS = (
-    *(
-        sp.exp,
-        sp.log,
-        expm1,
-        log1p,
-        sp.sin,
-        sp.cos,
-        sp.tan,
-        sp.asin,
-        sp.acos,
-        sp.atan,
-        sp.atan2,
-        sp.sinh,
-        sp.cosh,
-        sp.tanh,
-    ),
-    *(sp.Abs, sp.sign, sp.Min, sp.Max, inverse),
-)
-_OTHERS = (
-    sp.Symbol,
-    sp.Number,
-    type(sp.pi),
-    type(sp.E),
-    sp.Add,
-    sp.Mul,
-    sp.Pow,
-    sp.Piecewise,
-    ExprCondPair,
-)
+NAMES = "exp log sin cos tan asin acos atan atan2 sinh cosh tanh Abs sign Min Max"
+FUNCTIONS = (*(getattr(sp, name) for name in NAMES.split()), expm1, log1p, inverse)
+_NUMBERS = (sp.Symbol, sp.Number, type(sp.pi), type(sp.E))
+_OTHERS = (*_NUMBERS, sp.Add, sp.Mul, sp.Pow, sp.Piecewise, ExprCondPair)
 _KNOWN = (*FUNCTIONS, *_OTHERS, Relational, sp.And, sp.Or, type(sp.true))
 # What the printed functions call beside JavaScript's own.
 RUNTIME = "const kfInverse = (x) => (x === 0 ? 0 : 1 / x);\n"

@@ -25,11 +25,11 @@ from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import OF_A_VARIANT, Model
 from kfcourse.symbolic.reading import (
-    Formula,
     Formulas,
     ModelError,
     by_name,
     exact_number,
+    numbers,
     read,
     shown,
     table,
@@ -112,11 +112,17 @@ class JumpModel:
                 raise ModelError(f"mode {name}: {error}") from None
             changed |= set(own)
         fitting = _fitting(tuple(tables), built)
-        chain, rows = _chain(transition, len(built))
-        matrix, of_step = _compiled(chain, fitting[0], common, changed)
-        if rows == 1 and first is None and not matrix.has(*fitting[0].x):
-            first = np.asarray(of_step.at(0)()[0], dtype=float)[0].tolist()
-        model = cls(tuple(tables), fitting, _law(first, len(built)), matrix, of_step)
+        rows = np.atleast_2d(np.array(transition, dtype=object))
+        size = len(fitting)
+        if rows.shape not in ((1, size), (size, size)) or any(map(np.ndim, rows.flat)):
+            raise ModelError(
+                f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or "
+                f"one row, got {shown(transition)}"
+            )
+        matrix, of_step = _compiled(np.broadcast_to(rows, (size, size)), fitting[0], changed)
+        if len(rows) == 1 and first is None and not matrix.has(*fitting[0].x):
+            first = of_step.at(0)(np.zeros(fitting[0].n))[0][0].tolist()
+        model = cls(tuple(tables), fitting, _law(first, size), matrix, of_step)
         if not model.by_state:
             # a row that is none is refused here; of later steps and of states, where they are
             # reached
@@ -176,21 +182,18 @@ class JumpModel:
 
     def transition_of(self, x: Array, k: int) -> Array:
         """pi at step k and states x (..., n), (..., J, J)."""
-        size = len(self.modes)
-        if not self.by_state:
-            return np.broadcast_to(self.transition_at(k), (*x.shape[:-1], size, size))
         with np.errstate(all="ignore"):
-            rows = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
-            _probabilities(f"`transition` at step {k}", rows[np.isfinite(x).all(axis=-1)])
-            return rows / rows.sum(axis=-1, keepdims=True)
+            rows = self.chain_of_step.at(k)(x)[0]
+        finite = rows[np.isfinite(x).all(axis=-1)] if self.by_state else rows
+        _probabilities(f"`transition` at step {k}", finite)
+        rows = rows / rows.sum(axis=-1, keepdims=True)
+        return np.broadcast_to(rows, (*x.shape[:-1], *self.chain.shape))
 
     def transition_at(self, k: int) -> Array:
         """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends
         on the state."""
         self.without_state("a matrix of transitions for all states")
-        with np.errstate(all="ignore"):
-            rows = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
-        return _probabilities(f"`transition` at step {k}", rows)
+        return self.transition_of(np.zeros(self.n), k)
 
     def law_at(self, k: int) -> Array:
         """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError
@@ -262,76 +265,44 @@ def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...
     return tuple(modes)
 
 
-def _chain(given: Any, size: int) -> tuple[list[list[Formula]], int]:
-    """Rows of the matrix, (J, J), and how many were given."""
-
-    def is_row(row: Any) -> bool:
-        return isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)
-
-    rows = [*given] if is_row(given) else []
-    count = len(rows) if any(map(is_row, rows)) else 1
-    if count == 1 and rows and not is_row(rows[0]):
-        rows = [rows] * size
-    if not rows or len(rows) != size or not all(is_row(row) and len(row) == size for row in rows):
-        raise ModelError(
-            f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or one "
-            f"row, got {shown(given)}"
-        )
-    return [list(row) for row in rows], count
-
-
-def _compiled(
-    rows: list[list[Formula]], model: Model, common: Mapping[str, float], changed: set[str]
-) -> tuple[sp.ImmutableMatrix, Stepwise]:
+def _compiled(rows: Array, model: Model, changed: set[str]) -> tuple[sp.ImmutableMatrix, Stepwise]:
+    """The chain as formulas, and as a function of the state at each step."""
+    taken = by_name(model.x, model.v, model.w)
+    of_step = model.known.names([*model.parameters, *changed, *taken])
     # what differs between the modes is not known
-    names = {name: symbol(name) for name in common if name not in changed}
-    of_step = model.known.names(
-        [*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))]
-    )
-    known = names | of_step | by_name(model.x)
+    names = {name: symbol(name) for name in model.parameters if name not in changed}
+    names |= of_step | by_name(model.x)
     try:
         matrix = sp.ImmutableMatrix(
+            *rows.shape,
             [
-                [
-                    read(p, known, "transition")
-                    if isinstance(p, str | sp.Expr)
-                    else exact_number("an entry", p)
-                    for p in row
-                ]
-                for row in rows
-            ]
+                read(p, names, "transition")
+                if isinstance(p, str | sp.Expr)
+                else exact_number("an entry", p)
+                for p in rows.flat
+            ],
         )
     except (ModelError, FormulaError) as error:
         raise ModelError(f"`transition`: {error}") from None
-    arguments = {"x": sp.Matrix(model.x)} if matrix.has(*model.x) else {}
-    numeric = matrix.subs(
-        {symbol(name): exact_number(f"parameter {name}", value) for name, value in common.items()}
-    )
-    used = model.known.used(matrix, of_step)
-    return matrix, Stepwise.compile(
-        used, "transition", arguments, {"transition": numeric}, [*arguments]
-    )
+    numeric, known = {"transition": matrix.subs(model.values)}, model.known.used(matrix, of_step)
+    return matrix, Stepwise.compile(known, "transition", {"x": sp.Matrix(model.x)}, numeric, ["x"])
 
 
 def _law(first: Any, size: int) -> Array:
-    try:
-        law = np.asarray(first, dtype=float)
-    except (TypeError, ValueError):
-        law = np.array(np.nan)
+    law = numbers(first)
     if law.shape != (size,):
         raise ModelError(
             f"`first` must be {size} probabilities for {size} mode(s), those of the modes at the "
             f"first measurement; got {shown(first)}"
         )
-    return _probabilities("`first`", law)
+    _probabilities("`first`", law)
+    return law / law.sum()
 
 
-def _probabilities(what: str, rows: Array) -> Array:
-    """Rows (..., J) that sum to 1; ModelError for those that are none."""
-    total = rows.sum(axis=-1, keepdims=True)
-    wrong = ~((rows >= 0).all(axis=-1) & (np.abs(total[..., 0] - 1) <= SUM))
+def _probabilities(what: str, rows: Array) -> None:
+    """ModelError for rows (..., J) that are no probabilities."""
+    wrong = ~((rows >= 0).all(axis=-1) & (np.abs(rows.sum(axis=-1) - 1) <= SUM))
     if wrong.any():
         raise ModelError(
             f"{what}: {rows[wrong][0].tolist()} are no probabilities, at least 0 and together 1"
         )
-    return np.asarray(rows / total)

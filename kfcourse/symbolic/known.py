@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import Array
+from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
@@ -22,7 +22,7 @@ from kfcourse.symbolic.reading import (
     exact_matrix,
     exact_number,
     law,
-    of_numbers,
+    numbers,
     read,
     shown,
     table,
@@ -107,10 +107,7 @@ class Known:
 
 
 def _sequence(name: str, given: Any) -> tuple[float, ...]:
-    try:
-        values = np.asarray(given, dtype=float) if of_numbers(given) else np.array(np.nan)
-    except (TypeError, ValueError, OverflowError):
-        values = np.array(np.nan)
+    values = numbers(given)
     if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
         raise ModelError(
             f"the input {name} must be a list of finite numbers, one for every step; got "
@@ -145,17 +142,13 @@ class Stepwise(NamedTuple):
         function = self.compiled.function
         if not self.known.symbols:
             return function
-        values = self.known.at(needed(k))
+        if k is None:
+            raise ModelError(
+                "the model depends on the step: say which, as in structure.at(k) or "
+                "equation(x, v, k)"
+            )
+        values = self.known.at(k)
         return lambda *arrays: function(*arrays, values)
-
-
-def needed(k: int | None) -> int:
-    """The step; ModelError if it is not given."""
-    if k is None:
-        raise ModelError(
-            "the model depends on the step: say which, as in structure.at(k) or equation(x, v, k)"
-        )
-    return k
 
 
 def varying_law(
@@ -163,37 +156,32 @@ def varying_law(
     given: Mapping[str, Any] | None,
     noises: Sequence[sp.Symbol],
     symbols: dict[str, sp.Symbol],
-) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any]]:
+) -> tuple[dict[sp.Symbol, sp.Expr], Gaussian]:
     """A law of noises in which variances may be formulas of the step.
 
-    A noise with the mean m and the variance D_k is m + sqrt(D_k) v with a standard v: this goes
-    into the equations.
+    A noise with the mean m and the variance D_k is m + sqrt(D_k) (v - m) with a v of the variance
+    1: this goes into the equations.
 
     Returns
     -------
-    dict, dict
-        What takes the place of each such noise in the equations, and the law that is left for the
-        noises.
+    dict, Gaussian
+        What takes the place of each such noise in the equations, and the law of the noises.
     """
-    parts, size = table(what, given), len(noises)
+    parts = table(what, given)
     variance = parts.get("variance")
-    entries = [variance] * size
+    entries = [variance] * len(noises)
     if isinstance(variance, Sequence) and not isinstance(variance, str):
         entries = [*variance]
     formulas = {
-        i: read(entry, symbols, what) for i, entry in enumerate(entries) if _is_formula(entry)
+        i: read(entry, symbols, what)
+        for i, entry in enumerate(entries)
+        if isinstance(entry, str) or (isinstance(entry, sp.Expr) and entry.free_symbols)
     }
-    if not formulas:
-        return {}, parts
-    if len(entries) != size:
-        raise ModelError(f"`{what}`: {len(entries)} variances for {size} noise(s): one for each")
-    mean = exact_matrix(law(what, {"mean": parts.get("mean", 0.0)}, size).mean)
-    changes = {noises[i]: mean[i] + sp.sqrt(formula) * noises[i] for i, formula in formulas.items()}
-    return changes, {
-        "mean": [0.0 if i in formulas else float(mean[i]) for i in range(size)],
-        "variance": [1.0 if i in formulas else entry for i, entry in enumerate(entries)],
-    }
-
-
-def _is_formula(entry: Any) -> bool:
-    return isinstance(entry, str) or (isinstance(entry, sp.Expr) and bool(entry.free_symbols))
+    if formulas:
+        parts["variance"] = [1.0 if i in formulas else each for i, each in enumerate(entries)]
+    result = law(what, parts, len(noises))
+    mean = exact_matrix(result.mean)
+    return {
+        noises[i]: mean[i] + sp.sqrt(formula) * (noises[i] - mean[i])
+        for i, formula in formulas.items()
+    }, result

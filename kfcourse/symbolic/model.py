@@ -23,7 +23,7 @@ import sympy as sp
 
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees, warn_of_meters
+from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees
 from kfcourse.symbolic.codegen import check_numbers
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.known import Known, varying_law
@@ -35,7 +35,6 @@ from kfcourse.symbolic.reading import (
     exact_number,
     formula_list,
     law,
-    names_in,
     read,
     shown,
     table,
@@ -156,7 +155,7 @@ class Model:
             formula_list("meter", meter),
             Known.read(interval, inputs),
         )
-        used = {name for formula in (*a, *b) for name in names_in(formula)}
+        used = {name for f in (*a, *b) for name in re.findall(r"[A-Za-z]\w*", str(f))}
         named = _symbols(symbols, [*values, *known.inputs], used, len(a))
         x, v, w = (tuple(symbol(name) for name in named[key]) for key in "xvw")
         if len(x) != len(a):
@@ -166,8 +165,8 @@ class Model:
             )
         of_step = known.names([*values, *by_name(x, v, w)])
         constants = {name: symbol(name) for name in values} | of_step
-        change_v, state_noise = varying_law("state_noise", state_noise, v, constants)
-        change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants)
+        change_v, law_v = varying_law("state_noise", state_noise, v, constants)
+        change_w, law_w = varying_law("meter_noise", meter_noise, w, constants)
         state_equation = sp.ImmutableMatrix(
             [read(f, constants | by_name(x, v), "state") for f in a]
         ).subs(change_v)
@@ -182,20 +181,15 @@ class Model:
             w,
             values,
             law("prior", prior, len(x)),
-            law("state_noise", state_noise, len(v)),
-            law("meter_noise", meter_noise, len(w)),
+            law_v,
+            law_w,
             read_angles(angles, [s.name for s in x], _measured(len(b))),
             known.used(sp.Matrix([*state_equation, *meter_equation]), of_step),
         )
-        if angles is None:
-            warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
-            warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
-        # which says all that is to be said of the meter
-        elif not (isinstance(angles, Mapping) and "y" in angles):
-            warn_of_meters(
-                dict(zip(model.measured, model.meter_equation, strict=True)), model.angles, x
-            )
-        warn_of_degrees("the prior mean", model.prior.mean, [s.name for s in x], model.angles.x)
+        state_by_name = dict(zip((s.name for s in x), model.state_equation, strict=True))
+        meter_by_name = dict(zip(model.measured, model.meter_equation, strict=True))
+        warn_of_angles(angles, model.angles, state_by_name, meter_by_name)
+        warn_of_degrees("the prior mean", model.prior.mean, [*state_by_name], model.angles.x)
         model._check()
         if not model.meter_equation.has(*x):
             raise ModelError(
@@ -270,8 +264,6 @@ class Model:
     def of_table(cls, table: Mapping[str, Any]) -> Model:
         """The model of a table such as [variants.53]: its keys are the arguments of `define`, but
         for title and steps."""
-        if not isinstance(table, Mapping) or not {"state", "meter"} <= set(table):
-            raise ModelError(f"expected a table with state and meter, got {shown(table)}")
         return cls.define(**{key: table[key] for key in table if key not in OF_A_VARIANT})
 
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
@@ -333,10 +325,6 @@ class Model:
         return lines
 
     def __repr__(self) -> str:
-        return self._text
-
-    @cached_property
-    def _text(self) -> str:
         rate = "{}'" if self.between is None else "d{}/dt"
         a = ", ".join(
             f"{rate.format(name)} = {formula}"
@@ -355,6 +343,33 @@ class Model:
         )
         parts = [values, f"angles {angles}" if angles else "", f"inputs {inputs}" if inputs else ""]
         return f"Model({a}, {b}{''.join(f'; {part}' for part in parts if part)})"
+
+
+def nothing_random(model: Model) -> str:
+    """Why there is nothing to filter in a model: too little of it is random; empty if there is
+    enough."""
+    moving, measured = (
+        any(
+            variance and equation.subs(model.values).has(noise)
+            for noise, variance in zip(noises, law.cov.diagonal(), strict=True)
+        )
+        for equation, noises, law in (
+            (model.state_equation, model.v, model.state_noise),
+            (model.meter_equation, model.w, model.meter_noise),
+        )
+    )
+    if not moving and not model.prior.cov.any():
+        return (
+            f"the state is known exactly: neither the prior nor a noise of the state equation "
+            f"{list(model.state_equation)} has a variance; give one of them a variance above 0"
+        )
+    if not (moving or measured):
+        return (
+            f"no noise enters the state equation {list(model.state_equation)} or the meter "
+            f"{list(model.meter_equation)}: after some measurements nothing would be left to "
+            "estimate; add a noise to one of them"
+        )
+    return ""
 
 
 def _measured(p: int) -> list[str]:

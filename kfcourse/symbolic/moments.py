@@ -24,6 +24,7 @@ import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
 from kfcourse.errors import NoClosedForm
+from kfcourse.symbolic.formula import degree
 
 MAX_DEGREE = 40
 
@@ -170,7 +171,7 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
         return isinstance(e, sp.sin | sp.cos | sp.sinh | sp.cosh) and e.has(*variables)
 
     rewritten = sp.sympify(function).replace(with_variables, lambda e: e.rewrite(sp.exp))
-    if _polynomial_degree(rewritten, variables) > MAX_DEGREE:
+    if degree(rewritten, variables) > MAX_DEGREE:
         raise NoClosedForm(
             f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
             "use a numerical structure, unscented(model) or gauss_hermite(model)",
@@ -216,19 +217,6 @@ def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:
         "no_mean",
         term=factor,
     )
-
-
-def _polynomial_degree(e: sp.Expr, variables: Sequence[sp.Symbol]) -> int:
-    """A bound on the degree after expansion, found without expanding."""
-    if not e.has(*variables) or isinstance(e, sp.exp):
-        return 0
-    if e.is_Pow and e.exp.is_Integer and e.exp > 0:
-        return int(e.exp) * max(_polynomial_degree(e.base, variables), 1)
-    if e.is_Mul:
-        return sum(_polynomial_degree(a, variables) for a in e.args)
-    if e.is_Add:
-        return max(_polynomial_degree(a, variables) for a in e.args)
-    return 1
 
 
 def _cis(exponent: sp.Expr) -> sp.Expr:

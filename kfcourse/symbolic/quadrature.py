@@ -82,10 +82,6 @@ def unscented(model: Model, kappa: float | None = None) -> Structure:
         be found by points.
     """
 
-    expect(model, Model, "unscented")
-    if model.between is not None:
-        return model.between.structure(model, partial(unscented, kappa=kappa))
-
     def rule(size: int) -> tuple[Array, Array]:
         k = max(3.0 - size, 0.0) if kappa is None else float(kappa)
         if not 0 < size + k < np.inf:
@@ -95,7 +91,7 @@ def unscented(model: Model, kappa: float | None = None) -> Structure:
         weights[0] = k / (size + k)
         return np.concatenate([np.zeros((1, size)), axes, -axes]), weights
 
-    return _checked("unscented", model, rule, _sides(model, with_factors=True), order=5)
+    return _checked(model, partial(unscented, kappa=kappa), rule, 5, with_factors=True)
 
 
 def gauss_hermite(model: Model, order: int = 5) -> Structure:
@@ -115,14 +111,12 @@ def gauss_hermite(model: Model, order: int = 5) -> Structure:
         A function is not finite at a point of the prior law, or twice as many points an axis give
         other moments there.
     """
-    expect(model, Model, "gauss_hermite")
-    if model.between is not None:
-        return model.between.structure(model, partial(gauss_hermite, order=order))
     if not isinstance(order, int | np.integer) or order < 2:
         raise ModelError(
             f"Gauss-Hermite quadrature needs an order of at least 2, a whole number, got {order!r}"
         )
-    return _checked("gauss-hermite", model, product_rule(order), _sides(model), order)
+    build = partial(gauss_hermite, order=order)
+    return _checked(model, build, partial(product_rule, order), order)
 
 
 def axes(model: Model) -> int:
@@ -131,18 +125,16 @@ def axes(model: Model) -> int:
     return max(side.axes for side in _sides(model))
 
 
-def product_rule(order: int) -> Rule:
-    def rule(size: int) -> tuple[Array, Array]:
-        if order**size > MOST_POINTS:
-            raise ModelError(
-                f"{order} points on each of {size} axes are too many; lower the order or use "
-                f"unscented(model)"
-            )
-        nodes, weights = np.polynomial.hermite_e.hermegauss(order)
-        points = np.array(list(cartesian(nodes, repeat=size)))
-        return points, np.prod(list(cartesian(weights / weights.sum(), repeat=size)), axis=1)
-
-    return rule
+def product_rule(order: int, size: int) -> tuple[Array, Array]:
+    """Points (q, size) and weights (q,) of the Gauss-Hermite rule, `order` points an axis."""
+    if order**size > MOST_POINTS:
+        raise ModelError(
+            f"{order} points on each of {size} axes are too many; lower the order or use "
+            f"unscented(model)"
+        )
+    nodes, weights = np.polynomial.hermite_e.hermegauss(order)
+    points = np.array(list(cartesian(nodes, repeat=size)))
+    return points, np.prod(list(cartesian(weights / weights.sum(), repeat=size)), axis=1)
 
 
 class _Side(NamedTuple):
@@ -154,7 +146,6 @@ class _Side(NamedTuple):
     mean: Array  # of all noises
     root: Array  # of the covariance of the noises with points, columns for them only
     factors: Stepwise  # B D B^T of those without points
-    of_state: bool  # whether it depends on the state
     angles: Components  # components of the function's value
     size: int
     points: Array = np.empty((0, 0))
@@ -168,10 +159,10 @@ class _Side(NamedTuple):
     def added(self, x: Array, k: int | None) -> Array:
         """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given
         x."""
-        if not self.of_state:
-            return symmetric(self.factors.at(k)()[0])
-        covs = np.broadcast_to(self.factors.at(k)(x)[0], (*x.shape[:-1], self.size, self.size))
-        return symmetric(np.einsum("q,...qij->...ij", self.weights, covs))
+        covs = self.factors.at(k)(x)[0]
+        if covs.ndim > 2:
+            covs = np.einsum("q,...qij->...ij", self.weights, covs)
+        return symmetric(covs)
 
     def propagated(self, mean: Array, cov: Array, k: int | None) -> tuple[Array, ...]:
         """A law of the state through the function: its mean, its deviations from that at the points
@@ -217,94 +208,98 @@ def _sides(model: Model, with_factors: bool = False) -> tuple[_Side, _Side]:
     """Object and meter, with points for the noises that do not enter linearly, or for those
     `with_factors` of the state, too."""
     state, meter = compile_model(model)
-    of = (
-        (state, model.state_equation, model.v, model.state_noise, model.angles.x),
-        (meter, model.meter_equation, model.w, model.meter_noise, model.angles.y),
-    )
-    first, second = (_side(model, with_factors, *parts) for parts in of)
-    return first, second
+    return (
+        _side(
+            model, with_factors, state, model.state_equation, model.v, model.state_noise,
+            model.angles.x,
+        ),
+        _side(
+            model, with_factors, meter, model.meter_equation, model.w, model.meter_noise,
+            model.angles.y,
+        ),
+    )  # fmt: skip
 
 
 def _side(
-    model: Model, with_factors: bool, function, formulas, noises, law: Gaussian, angles: Components
+    model: Model, with_factors: bool, function, equation, noises, law: Gaussian, angles: Components
 ) -> _Side:
-    size, count = len(formulas), len(noises)
-    slopes = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if count else []
-    factors = sp.Matrix(size, count, list(slopes))
+    factors = equation.subs(model.values).jacobian(list(noises))
     varying = (*model.x, *noises) if with_factors else noises
-    columns = [factors[:, j] for j in range(count)]
-    other = np.array(
-        [
-            (column.has(*varying) and column.applyfunc(sp.simplify).has(*varying))
-            or decides(formulas, [noise])
-            for column, noise in zip(columns, noises, strict=True)
-        ],
-        dtype=bool,
+    columns = zip(noises, factors.T.tolist(), strict=True)
+    pointed = np.array(
+        [sp.Matrix(column).has(*varying) or decides(equation, [v]) for v, column in columns]
     )
-    while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
-        other |= correlated
-    cov = exact_matrix(np.where(other[:, None] | other, 0.0, law.cov))
-    rest = sp.Matrix(size, count, lambda i, j: 0 if other[j] else factors[i, j])
-    added = rest * cov * rest.T
-    arguments = {"x": sp.Matrix(model.x)} if added.has(*model.x) else {}
-    stepwise = Stepwise.compile(model.known, "added", arguments, {"added": added}, [*arguments])
-    root = np.zeros((count, int(other.sum())))
-    root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Side(model, function, law.mean, root, stepwise, bool(arguments), angles, size)
+    for _ in noises:  # and what is correlated with one of them
+        pointed |= (law.cov[:, pointed] != 0).any(axis=1)
+    cov = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
+    added = {"added": factors * cov * factors.T}
+    stepwise = Stepwise.compile(model.known, "added", {"x": sp.Matrix(model.x)}, added, ["x"])
+    root = np.eye(len(noises))[:, pointed] @ square_root(law.cov[np.ix_(pointed, pointed)])
+    return _Side(model, function, law.mean, root, stepwise, angles, len(equation))
 
 
-def _checked(name: str, model: Model, rule: Rule, sides: Sequence[_Side], order: int) -> Structure:
+def _checked(
+    model: Model,
+    build: partial[Structure],
+    rule: Rule,
+    order: int,
+    with_factors: bool = False,
+) -> Structure:
     """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and
     of twice the order."""
-    structure = _by_points(name, model, rule, sides)
+    name = build.func.__name__.replace("_", "-")
+    expect(model, Model, name)
+    if model.between is not None:
+        return model.between.structure(model, build)
+    sides = _sides(model, with_factors)
+    structure, problem = _by_points(name, model, rule, sides), ""
     with np.errstate(all="ignore"):
-        if not all(np.isfinite(moment).all() for _, moment, *_ in _prior_moments(structure)):
-            _warn(f"{name}: a function of {model} is not finite at the points of the prior law", 4)
+        if not all(np.isfinite(part).all() for law in _at_prior(structure) for part in law):
+            problem = f"{name}: a function of {model} is not finite at the points of the prior law"
         elif (2 * order) ** max(side.axes for side in sides) <= MOST_POINTS:
-            with warnings.catch_warnings():
-                # these points are not those that the filter uses
-                warnings.simplefilter("ignore", QuadratureWarning)
-                rules = (product_rule(order), product_rule(2 * order))
-                coarse, fine = (
-                    _prior_moments(_by_points(name, model, each, sides)) for each in rules
-                )
-            for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
-                more = near(more, less, angles)
-                apart = np.nan_to_num(np.abs(more - less) / scale, nan=np.inf)
-                if apart.max() > CONVERGED:
-                    worst = np.unravel_index(np.argmax(apart), less.shape)
-                    _warn(
-                        f"{name}: the {what} of {model} at the prior law is {less[worst]:.4g} "
-                        f"with {order} points an axis and "
-                        f"{more[worst]:.4g} with {2 * order}: it may be infinite, or the function "
-                        f"too rough for these points",
-                        4,
-                    )
-                    break
+            problem = _disagreement(model, name, order, sides)
+    if problem:
+        _warn(problem)
     return structure
 
 
-def _prior_moments(structure: Structure) -> list[tuple[str, Array, Array, Components]]:
-    """Name, value and natural size of the moments at the prior law, and which components are
-    angles."""
-    first, angles, moments = structure.at(0), structure.model.angles, []
-    h, _, F, _ = first.measure(*structure.model.prior)
-    laws = (
-        ("next state", first.predict(*structure.model.prior), angles.x),
-        ("measurement", Gaussian(h, F), angles.y),
-    )
-    for what, (mean, cov), which in laws:
+def _disagreement(model: Model, name: str, order: int, sides: Sequence[_Side]) -> str:
+    """What Gauss-Hermite rules of this order and of twice the order say otherwise at the prior law;
+    empty if nothing."""
+    with warnings.catch_warnings():
+        # these points are not those that the filter uses
+        warnings.simplefilter("ignore", QuadratureWarning)
+        rules = (partial(product_rule, points) for points in (order, 2 * order))
+        coarse, fine = (_at_prior(_by_points(name, model, rule, sides)) for rule in rules)
+    parts = zip(("next state", "measurement"), coarse, fine, model.angles, strict=True)
+    for what, less, more, angles in parts:
         # rounding: what does not vary has no size of its own
-        sd = np.sqrt(np.maximum(np.diagonal(cov), 0.0)) + 1e-12 * (1 + np.abs(mean))
-        moments += [
-            (f"mean of the {what}", mean, sd, which),
-            (f"covariance of the {what}", cov, sd[:, None] * sd, ()),
-        ]
-    return moments
+        sd = np.sqrt(np.maximum(np.diagonal(more.cov), 0.0)) + 1e-12 * (1 + np.abs(more.mean))
+        pairs = (
+            ("mean", less.mean, near(more.mean, less.mean, angles), sd),
+            ("covariance", less.cov, more.cov, np.outer(sd, sd)),
+        )
+        for moment, before, after, scale in pairs:
+            apart = np.nan_to_num(np.abs(after - before) / scale, nan=np.inf)
+            if apart.max() > CONVERGED:
+                worst = np.unravel_index(np.argmax(apart), apart.shape)
+                return (
+                    f"{name}: the {moment} of the {what} of {model} at the prior law is "
+                    f"{before[worst]:.4g} with {order} points an axis and {after[worst]:.4g} with "
+                    f"{2 * order}: it may be infinite, or the function too rough for these points"
+                )
+    return ""
 
 
-def _warn(text: str, stacklevel: int) -> None:
-    warnings.warn(text, QuadratureWarning, stacklevel=stacklevel)
+def _at_prior(structure: Structure) -> tuple[Gaussian, Gaussian]:
+    """Laws of the next state and of the measurement at the prior law."""
+    now, prior = structure.at(0), structure.model.prior
+    h, _, F, _ = now.measure(*prior)
+    return now.predict(*prior), Gaussian(h, F)
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, QuadratureWarning, stacklevel=4)
 
 
 def _warn_of_turns(model: Model, deviation: Array) -> None:
@@ -316,29 +311,24 @@ def _warn_of_turns(model: Model, deviation: Array) -> None:
                 f"points of the angle {model.x[i]} lie {widest:.3g} to either side of its "
                 f"mean, more than half a turn: "
                 "its variance is too large for these points; take linearised(model), or a smaller "
-                "prior variance",
-                3,
+                "prior variance"
             )
 
 
 def _lower_root(cov: Array) -> tuple[Array, Array]:
     """The Cholesky factor, and which components (..., n) the earlier ones determine: their columns
     are those of I."""
-    n = cov.shape[-1]
+    n, known = cov.shape[-1], np.zeros(cov.shape[:-1], dtype=bool)
     try:
-        return np.linalg.cholesky(cov), np.zeros(cov.shape[:-1], dtype=bool)
+        return np.linalg.cholesky(cov), known
     except np.linalg.LinAlgError:
-        root, rest, known = np.zeros_like(cov), cov.copy(), np.zeros(cov.shape[:-1], dtype=bool)
+        root, rest = np.zeros_like(cov), cov
     for j in range(n):
-        pivot = rest[..., j, j]
-        known[..., j] = ~(pivot > n * EPS * cov[..., j, j])
-        column = np.where(
-            np.arange(n) >= j,
-            rest[..., :, j] / np.sqrt(np.where(known[..., j], 1.0, pivot))[..., None],
-            0.0,
-        )
-        root[..., :, j] = np.where(known[..., j, None], np.eye(n)[j], column)
-        column = np.where(known[..., j, None], 0.0, column)
+        pivot = rest[..., j, j, None]
+        skipped = ~(pivot > n * EPS * cov[..., j, j, None])
+        column = rest[..., j] / np.sqrt(np.where(skipped, 1.0, pivot))
+        column = np.where(skipped | (np.arange(n) < j), 0.0, column)
+        root[..., j], known[..., j] = np.where(skipped, np.eye(n)[j], column), skipped[..., 0]
         rest = rest - column[..., :, None] * column[..., None, :]
     return root, known
 

@@ -6,17 +6,16 @@ says what to change.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
 
 from kfcourse.errors import ModelError
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import Array, Gaussian, is_covariance
 from kfcourse.symbolic.formula import parse
-from kfcourse.symbolic.sense import is_covariance
 
 Formula: TypeAlias = str | sp.Expr
 Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
@@ -49,22 +48,20 @@ def table(what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
 
 def exact_number(what: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
-    kinds = int | float | np.integer | np.floating | sp.Rational
     try:
-        number = float(value) if isinstance(value, kinds) else float("nan")
+        number = float(value) if isinstance(value, Real) else float("nan")
     except OverflowError:
         number = float("inf")
     if isinstance(value, bool) or not np.isfinite(number):
         raise ModelError(f"{what} = {shown(value)}: expected a finite number")
     if number and not 1e-100 < abs(number) < 1e100:
         raise ModelError(f"{what} = {shown(value)} is too large or too small; change the units")
-    return value if isinstance(value, sp.Rational) else sp.Rational(str(value))
+    return sp.Rational(str(value))
 
 
 def exact_matrix(array: Array) -> sp.ImmutableMatrix:
     """Decimal numbers as exact rationals; a vector becomes a column."""
-    rows = array[:, None] if array.ndim == 1 else array
-    return sp.ImmutableMatrix([[sp.Rational(str(float(value))) for value in row] for row in rows])
+    return sp.ImmutableMatrix(np.vectorize(lambda v: sp.Rational(str(v)), otypes=[object])(array))
 
 
 def formula_list(what: str, formulas: Formulas) -> list[Formula]:
@@ -81,19 +78,12 @@ def formula_list(what: str, formulas: Formulas) -> list[Formula]:
     return result
 
 
-def names_in(formula: Formula) -> set[str]:
-    """Names that may be symbols in a formula."""
-    if isinstance(formula, str):
-        return set(re.findall(r"[A-Za-z][A-Za-z0-9_]*", formula))
-    return {s.name for s in formula.free_symbols if isinstance(s, sp.Symbol)}
-
-
 def read(formula: Formula, known: dict[str, sp.Symbol], what: str) -> sp.Expr:
     """A formula as an expression in the known symbols."""
     if isinstance(formula, str):
         return parse(formula, known)
     # Symbols of the caller are recognised by name, whatever their assumptions.
-    unknown = sorted(names_in(formula) - set(known))
+    unknown = sorted({s.name for s in formula.free_symbols} - set(known))
     if unknown:
         raise ModelError(
             f"the {what} equation {formula} has unknown symbols {', '.join(unknown)}; known: "
@@ -110,25 +100,22 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
             f"`{what}` has the keys mean and variance, not "
             f"{', '.join(sorted(set(parts) - {'mean', 'variance'}))}"
         )
+    mean, cov = numbers(parts.get("mean", 0.0)), numbers(parts.get("variance", 1.0))
     try:
-        if not of_numbers([*parts.values()]):
-            raise TypeError
-        mean = np.broadcast_to(np.asarray(parts.get("mean", 0.0), dtype=float), (size,)).copy()
-        cov = np.asarray(parts.get("variance", 1.0), dtype=float)
+        mean = np.broadcast_to(mean, (size,)).copy()
         cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
-    except (TypeError, ValueError, OverflowError):
+        fits = bool(np.isfinite(mean).all() and np.isfinite(cov).all())
+    except ValueError:
+        fits = False
+    if not fits:
         raise ModelError(
-            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: "
-            f"or a matrix), "
+            f"`{what}`: mean and variance must be finite numbers, or lists of {size} numbers "
+            f"(variance: or a matrix), "
             f"got {', '.join(f'{key} = {shown(value)}' for key, value in parts.items())}"
-        ) from None
-    if cov.shape != (size, size):
-        raise ModelError(
-            f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})"
         )
     problem = ""
-    if not (np.isfinite(mean).all() and np.isfinite(cov).all()):
-        problem = "mean and variance must be finite"
+    if cov.shape != (size, size):
+        problem = f"the covariance has shape {cov.shape}, expected ({size}, {size})"
     elif not np.array_equal(cov, cov.T):
         problem = "the covariance matrix must be symmetric"
     elif not is_covariance(cov):
@@ -138,9 +125,16 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
     return Gaussian(mean, cov)
 
 
-def of_numbers(given: Any) -> bool:
-    """Whether there are no texts and no truth values among the entries: NumPy would take "1e5" for
-    100000, and true for 1."""
-    if isinstance(given, Sequence) and not isinstance(given, str):
-        return all(map(of_numbers, given))
-    return not isinstance(given, str | bool | np.bool_)
+def numbers(given: Any) -> Array:
+    """Numbers as an array; NaN for what is none.  NumPy would take "1e5" for 100000, and true for
+    1."""
+
+    def plain(part: Any) -> bool:
+        if isinstance(part, Sequence) and not isinstance(part, str):
+            return all(map(plain, part))
+        return not isinstance(part, str | bool | np.bool_)
+
+    try:
+        return np.asarray(given if plain(given) else np.nan, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return np.array(np.nan)

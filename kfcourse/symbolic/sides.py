@@ -1,82 +1,123 @@
-"""The object or the meter of a model in symbols: its equation and Jacobians at the mean of a normal
-law."""
+"""The object or the meter of a model in symbols, at a normal law of the state: where the formulas
+of `linearised` and `gaussian` come from, and derivations by hand start."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import sympy as sp
 
 from kfcourse.laws import Gaussian
+from kfcourse.symbolic.choices import by_indicators, jumps
+from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import GaussianMoments
-from kfcourse.symbolic.reading import exact_matrix
-from kfcourse.symbolic.structure import gaussian_symbols
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+from kfcourse.symbolic.reading import by_name, exact_matrix
 
 
 @dataclass(frozen=True)
 class Side:
     """The object or the meter of a model, at a normal law of the state N(mean, cov), in symbols.
 
-    value, A, B: the equation and its Jacobians by state and noise, at the mean;  D: the noise's
-    covariance.
+    value, A, B: the equation and its Jacobians by state and noise, at the mean;  law: of the noise,
+    in exact numbers, with the covariance D.
     """
 
-    equation: sp.MatrixBase
+    equation: sp.ImmutableMatrix
     x: tuple[sp.Symbol, ...]
     noise: tuple[sp.Symbol, ...]
     law: Gaussian
-    mean: sp.MatrixBase
-    cov: sp.MatrixBase
+    mean: sp.ImmutableMatrix
+    cov: sp.ImmutableMatrix
 
     @classmethod
     def of(cls, model: Model, side: str) -> Side:
-        if side == "object":
-            return cls(
-                model.state_equation,
-                model.x,
-                model.v,
-                model.state_noise,
-                *gaussian_symbols(model, "z", "p"),
-            )
-        return cls(
-            model.meter_equation,
-            model.x,
-            model.w,
-            model.meter_noise,
-            *gaussian_symbols(model, "m", "d"),
+        equation, noise, law, names = (
+            (model.state_equation, model.v, model.state_noise, "zp")
+            if side == "object"
+            else (model.meter_equation, model.w, model.meter_noise, "md")
         )
+        exact = Gaussian(*map(exact_matrix, law))
+        return cls(equation, model.x, noise, exact, *gaussian_symbols(model, *names))
 
-    def at_mean(self, matrix: sp.MatrixBase) -> sp.Matrix:
-        point = dict(zip(self.x, self.mean, strict=True)) | dict(
-            zip(self.noise, exact_matrix(self.law.mean), strict=True)
-        )
-        return sp.Matrix(matrix.subs(point, simultaneous=True))
+    def _at_mean(self, matrix: sp.MatrixBase) -> sp.ImmutableMatrix:
+        pairs = zip((*self.x, *self.noise), (*self.mean, *self.law.mean), strict=True)
+        return sp.ImmutableMatrix(matrix.subs(dict(pairs), simultaneous=True))
+
+    @cached_property
+    def value(self) -> sp.ImmutableMatrix:
+        return self._at_mean(self.equation)
+
+    @cached_property
+    def A(self) -> sp.ImmutableMatrix:
+        return self._at_mean(self.equation.jacobian(sp.Matrix(self.x)))
+
+    @cached_property
+    def B(self) -> sp.ImmutableMatrix:
+        return self._at_mean(self.equation.jacobian(sp.Matrix(self.noise)))
 
     @property
-    def value(self) -> sp.Matrix:
-        return self.at_mean(self.equation)
+    def D(self) -> sp.ImmutableMatrix:
+        return self.law.cov
 
-    @property
-    def A(self) -> sp.Matrix:
-        return self.at_mean(self.equation.jacobian(sp.Matrix(self.x)))
-
-    @property
-    def B(self) -> sp.Matrix:
-        return self.at_mean(self.equation.jacobian(sp.Matrix(self.noise)))
-
-    @property
-    def D(self) -> sp.Matrix:
-        return sp.Matrix(exact_matrix(self.law.cov))
-
-    def noiseless_covariance(self) -> sp.Matrix:
+    def noiseless_covariance(self) -> sp.ImmutableMatrix:
         """Exact covariance of the equation over the law with the noise at its mean."""
-        quiet = self.equation.subs(dict(zip(self.noise, exact_matrix(self.law.mean), strict=True)))
-        moments = GaussianMoments(list(self.x), list(self.mean), sp.Matrix(self.cov))
-        return sp.Matrix(
-            len(quiet), len(quiet), lambda i, j: moments.covariance(quiet[i], quiet[j])
+        return moments(replace(self, law=Gaussian(self.law.mean, 0 * self.D)))[2]
+
+
+@lru_cache(maxsize=64)  # the same for all values of the parameters
+def taylor(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
+    """Value at the mean, slope A, and A cov A^T + B D B^T."""
+    if any(part.has(sp.Derivative, sp.DiracDelta) for part in (side.A, side.B)) or any(
+        jumps(choice, [*side.x, *side.noise]) for choice in side.equation.atoms(sp.Piecewise)
+    ):
+        raise NoClosedForm(
+            f"{list(side.equation)} is not differentiable and cannot be linearised; use "
+            f"unscented(model) or gauss_hermite(model)",
+            "no_slope",
         )
+    return side.value, side.A, side.A * side.cov * side.A.T + side.B * side.D * side.B.T
+
+
+@lru_cache(maxsize=64)
+def moments(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
+    """Mean, its slope by the state's mean, and covariance, over independent state and noise."""
+    law = GaussianMoments(
+        [*side.x, *side.noise], [*side.mean, *side.law.mean], sp.diag(side.cov, side.D)
+    )
+    parts = [by_indicators(formula, law.variables) for formula in side.equation]
+    mean, size = sp.ImmutableMatrix([law.mean_of(part) for part in parts]), len(parts)
+    upper = {
+        (i, j): law.covariance(parts[i], parts[j]) for i in range(size) for j in range(i, size)
+    }
+    cov = sp.ImmutableMatrix(size, size, lambda i, j: upper[min(i, j), max(i, j)])
+    return mean, mean.jacobian(side.mean), cov
+
+
+def gaussian_symbols(
+    model: Model, mean: str, cov: str
+) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
+    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12,
+    ...
+
+    A name that the model already uses gets a trailing underscore.
+    """
+    taken = {*model.parameters, *by_name(model.x, model.v, model.w, model.known.symbols)}
+
+    def fresh(name: str) -> sp.Symbol:
+        while name in taken:
+            name += "_"
+        return symbol(name)
+
+    n = model.n
+    if n == 1:
+        return sp.ImmutableMatrix([fresh(mean)]), sp.ImmutableMatrix([fresh(cov)])
+    means = [fresh(f"{mean}{i + 1}") for i in range(n)]
+    return sp.ImmutableMatrix(means), sp.ImmutableMatrix(
+        n, n, lambda i, j: fresh(f"{cov}{min(i, j) + 1}{max(i, j) + 1}")
+    )
 
 
 def plain(matrix: sp.MatrixBase) -> Any:

@@ -21,13 +21,11 @@ from functools import cached_property, lru_cache, partial
 from itertools import product as cartesian
 from typing import Any, NoReturn
 
-import numpy as np
 import sympy as sp
 
-from kfcourse.angles import Components, on_circle
-from kfcourse.errors import expect
+from kfcourse.angles import on_circle
+from kfcourse.errors import ModelError, NoClosedForm, expect
 from kfcourse.laws import (
-    Array,
     Gaussian,
     Matrices,
     Measurement,
@@ -35,12 +33,9 @@ from kfcourse.laws import (
     Vectors,
     measurement_of,
 )
-from kfcourse.symbolic.choices import by_indicators, jumps
-from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.sides import Side, moments, taylor
 from kfcourse.symbolic.typesetting import aligned
 from kfcourse.symbolic.writing import formula_lines
 
@@ -225,6 +220,10 @@ class StructuralFormulas:
         predict, measure = self.compiled_predict.at(k), self.compiled_measure.at(k)
         angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
 
+        def predicted(z: Vectors, p: Matrices) -> Gaussian:
+            tau, Theta = predict(z, p)
+            return Gaussian(on_circle(tau, angles.x), Theta)
+
         def measured(m: Vectors, d: Matrices) -> Measurement:
             h, G, R, explained = measure(m, d)
             return measurement(h, G, explained + R, R)
@@ -232,7 +231,7 @@ class StructuralFormulas:
         return Structure(
             self.name,
             self.model,
-            lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
+            predicted,
             measured,
             # compiled where it is asked for
             lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),
@@ -263,40 +262,8 @@ def of_steps(
     )
 
 
-def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
-    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and
-    pi."""
-    mean = law.mean if law.mean.ndim == over.ndim else np.broadcast_to(law.mean, over.shape)
-    return Gaussian(on_circle(mean, angles), law.cov)
-
-
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
     return list(dict.fromkeys([*mean, *cov]))
-
-
-def gaussian_symbols(
-    model: Model, mean: str, cov: str
-) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
-    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12,
-    ...
-
-    A name that the model already uses gets a trailing underscore.
-    """
-    taken = set(model.parameters) | {
-        s.name for s in (*model.x, *model.v, *model.w, *model.known.symbols)
-    }
-
-    def fresh(name: str) -> sp.Symbol:
-        while name in taken:
-            name += "_"
-        return symbol(name)
-
-    n = model.n
-    if n == 1:
-        return sp.ImmutableMatrix([fresh(mean)]), sp.ImmutableMatrix([fresh(cov)])
-    means = [fresh(f"{mean}{i + 1}") for i in range(n)]
-    covs = [[fresh(f"{cov}{min(i, j) + 1}{max(i, j) + 1}") for j in range(n)] for i in range(n)]
-    return sp.ImmutableMatrix(means), sp.ImmutableMatrix(covs)
 
 
 def linearised(model: Model) -> Structure:
@@ -311,44 +278,8 @@ def linearised(model: Model) -> Structure:
     NoClosedForm
         If an equation is not differentiable.
     """
-    expect(model, Model, "linearised")
-    if model.between is not None:
-        return model.between.structure(model, linearised)
-    (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
-    tau, A, B = _taylor(
-        model.state_equation, model.x, z, model.v, exact_matrix(model.state_noise.mean)
-    )
-    h, H, C = _taylor(
-        model.meter_equation, model.x, m, model.w, exact_matrix(model.meter_noise.mean)
-    )
-    functions = {
-        "tau": tau,
-        "Theta": A * p * A.T + B * exact_matrix(model.state_noise.cov) * B.T,
-        "h": h,
-        "G": H,
-        "F": H * d * H.T + C * exact_matrix(model.meter_noise.cov) * C.T,
-    }
     # e^(a+b) stays one: a height of 6500 km over a scale of 13 km has an e^a beyond all numbers.
-    return StructuralFormulas(
-        model, "linearised", z, p, m, d, _all_expanded(functions, power_exp=False)
-    ).structure()
-
-
-@lru_cache(maxsize=64)
-def _taylor(equation, x, mean, noise, noise_mean):
-    """Value and Jacobians by state and by noise, at (mean, noise_mean)."""
-    point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
-    parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
-    for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta) or any(
-            jumps(choice, [*x, *noise]) for choice in equation.atoms(sp.Piecewise)
-        ):
-            raise NoClosedForm(
-                f"{list(equation)} is not differentiable and cannot be linearised; use "
-                f"unscented(model) or gauss_hermite(model)",
-                "no_slope",
-            )
-    return tuple(part.subs(point, simultaneous=True) for part in parts)
+    return _derived(model, linearised, taylor, power_exp=False)
 
 
 def gaussian(model: Model) -> Structure:
@@ -361,41 +292,26 @@ def gaussian(model: Model) -> Structure:
     NoClosedForm
         If a term has no closed-form Gaussian mean: use `unscented` or `gauss_hermite`.
     """
-    expect(model, Model, "gaussian")
+    return _derived(model, gaussian, moments)
+
+
+def _derived(
+    model: Model,
+    build: Callable[[Model], Structure],
+    moments_of: Callable[[Side], tuple[sp.ImmutableMatrix, ...]],
+    **hints: bool,
+) -> Structure:
+    """The structure from mean, slope and covariance of both sides, multiplied out."""
+    name = build.__name__
+    expect(model, Model, name)
     if model.between is not None:
-        return model.between.structure(model, gaussian)
-    (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
-    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise))
-    h, F = _moments(model.meter_equation, model.x, m, d, model.w, *_exact(model.meter_noise))
-    functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
-    return StructuralFormulas(model, "gaussian", z, p, m, d, _all_expanded(functions)).structure()
-
-
-def _exact(law: Gaussian) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
-    return exact_matrix(law.mean), exact_matrix(law.cov)
-
-
-@lru_cache(maxsize=64)  # the same for all values of the parameters
-def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov):
-    """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
-    joint = GaussianMoments(
-        [*x, *noise], [*mean, *noise_mean], sp.diag(sp.Matrix(cov), sp.Matrix(noise_cov))
-    )
-    parts = [by_indicators(formula, joint.variables) for formula in equation]
-    means = sp.ImmutableMatrix([joint.mean_of(part) for part in parts])
-    covs = {
-        (i, j): joint.covariance(parts[i], parts[j])
-        for i in range(len(parts))
-        for j in range(i, len(parts))
-    }
-    size = len(parts)
-    return means, sp.ImmutableMatrix(size, size, lambda i, j: covs[min(i, j), max(i, j)])
-
-
-def _all_expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
-    return {
-        name: _expanded(sp.ImmutableMatrix(matrix), **hints) for name, matrix in functions.items()
-    }
+        return model.between.structure(model, build)
+    state, meter = Side.of(model, "object"), Side.of(model, "meter")
+    (tau, _, Theta), (h, G, F) = moments_of(state), moments_of(meter)
+    functions = {"tau": tau, "Theta": Theta, "h": h, "G": G, "F": F}
+    expanded = {key: _expanded(part, **hints) for key, part in functions.items()}
+    laws = state.mean, state.cov, meter.mean, meter.cov
+    return StructuralFormulas(model, name, *laws, expanded).structure()
 
 
 @lru_cache(maxsize=256)  # modes often have the same object, or the same meter, with other numbers

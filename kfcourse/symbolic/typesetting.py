@@ -77,15 +77,14 @@ def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
     """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around
     derivatives; of an `UnevaluatedExpr` with its terms and factors in the order in which they
     stand."""
-    written = isinstance(expression, sp.UnevaluatedExpr)
     settings = {
         "symbol_names": dict(names or {}),
         "diff_operator": "d",
         "mat_delim": "(",
         "fold_short_frac": False,
-        "order": "none" if written else None,
+        "order": "none" if isinstance(expression, sp.UnevaluatedExpr) else None,
     }
-    return str((Printer if written else _Ordered)(settings).doprint(expression))
+    return str(Printer(settings).doprint(expression))
 
 
 def aligned(lines: Sequence[str]) -> str:
@@ -118,13 +117,12 @@ class Printer(LatexPrinter):
             else printed
         )
 
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
+        terms = super()._as_ordered_terms(expr, order=order)
+        return terms if self.order == "none" else _ordered(terms)
+
     def _print_Identity(self, expr: sp.Identity) -> str:
         return "I"
-
-
-class _Ordered(Printer):
-    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
-        return _ordered(super()._as_ordered_terms(expr, order=order))
 
 
 def _ordered(terms: Sequence[sp.Expr]) -> list[sp.Expr]:

@@ -48,9 +48,8 @@ def formula_lines(
     width = WIDTH - symbols(before)
     if symbols(whole) <= width or not isinstance(expression, sp.Add):
         return [whole]
-    return joined(
-        [formula_latex(term, variables) for term in _Writer(variables, ()).terms(expression)], width
-    )
+    terms = _Writer(variables, ()).terms(expression)
+    return joined([formula_latex(term, variables) for term in terms], width)
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:
@@ -127,42 +126,27 @@ class _Writer:
         """Terms with the same parameters together: first the group with the shortest, earliest
         term; in it powers fall."""
         ordered = []
-        for parameters, group in groupby(sorted(total.args, key=self.kind), self.kind):
+        for (noises, parameters), group in groupby(sorted(total.args, key=self.kind), self.kind):
             members = sorted(
                 group, key=lambda term: [-self.degree(term, symbol) for symbol in self.rank]
             )
             first = min(
-                (term.could_extract_minus_sign(), self.length(term), self.place(term))
+                (term.could_extract_minus_sign(), self.degree(term, *self.rank), self.place(term))
                 for term in members
             )
-            ordered.append((parameters[0], first, parameters[1], members))
+            ordered.append((noises, first, parameters, members))
         return [
             term for *_, members in sorted(ordered, key=lambda item: item[:3]) for term in members
         ]
 
     def kind(self, term: sp.Expr) -> tuple[int, str]:
         """How many noises are in a term, and its parameters."""
-        return self.noisiness(term), str(
-            sp.Mul(
-                *[
-                    factor
-                    for factor in sp.Mul.make_args(term)
-                    if not self.varies(factor) and not factor.is_number
-                ]
-            )
-        )
-
-    def varies(self, factor: sp.Expr) -> bool:
-        return any(symbol in self.rank for symbol in factor.free_symbols)
-
-    def noisiness(self, term: sp.Expr) -> int:
-        return len(term.free_symbols & self.noises)
-
-    def length(self, term: sp.Expr) -> float:
-        """Degree of the term in its variables; a function of them counts as one."""
-        return float(
-            sum(self.power(factor) for factor in sp.Mul.make_args(term) if self.varies(factor))
-        )
+        parameters = [
+            factor
+            for factor in sp.Mul.make_args(term)
+            if not factor.is_number and self.rank.keys().isdisjoint(factor.free_symbols)
+        ]
+        return len(term.free_symbols & self.noises), str(sp.Mul(*parameters))
 
     def place(self, term: sp.Expr) -> int:
         return min(
@@ -170,14 +154,10 @@ class _Writer:
             default=len(self.rank),
         )
 
-    def degree(self, term: sp.Expr, symbol: sp.Symbol) -> float:
-        return float(
-            sum(
-                self.power(factor)
-                for factor in sp.Mul.make_args(term)
-                if symbol in factor.free_symbols
-            )
-        )
+    def degree(self, term: sp.Expr, *symbols: sp.Symbol) -> float:
+        """Degree of the term in these variables; a function of them counts as one."""
+        factors = sp.Mul.make_args(term)
+        return sum(self.power(factor) for factor in factors if factor.has(*symbols))
 
     def power(self, factor: sp.Expr) -> float:
         exponent = factor.as_base_exp()[1]

@@ -583,7 +583,11 @@ def test_the_command_compares_the_filters_of_such_a_variant(tmp_path, monkeypatc
         "0.5 }\n"
     )
     sizes = ["--runs", "128", "--steps", "2", "--filters", "aof-exact,aof-linearised", "--scores"]
-    done = CliRunner().invoke(main, ["lab", "mine", "--variants", "my.toml", *sizes])
+    done = CliRunner().invoke(
+        main, ["lab", "mine", "--variants", "my.toml", *sizes, "--json", "numbers.json"]
+    )
     assert done.exit_code == 0 and "LAOF" in done.stdout and Path("lab-mine/report.tex").exists()
+    numbers = json.loads(Path("numbers.json").read_text(encoding="utf-8"))
+    assert (numbers["model"]["drift"], numbers["model"]["diffusion"]) == ("-a*x", "1")
     scores = done.stdout.split("CRPS\n")[1].splitlines()[:2]
     assert [line.split()[-1] == "–" for line in scores] == [True, False]  # its law is not normal

@@ -18,7 +18,7 @@ import sympy as sp
 from kfcourse.filters import EQUATIONS, aof, latex, pointmass
 from kfcourse.filters.designed import Design
 from kfcourse.lab import FILTERS, LAB, find_variant, lab_filters, load_variants
-from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures
+from kfcourse.lab.short_names import JUMP_FILTERS, Structures
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import compare, run
@@ -140,7 +140,7 @@ def filters(name):
 
 def modes(name):
     """The same of filters with modes that need no design."""
-    built_of = JumpStructures(VARIANTS[name])
+    built_of = Structures(VARIANTS[name])
     values = {}
     for short in ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-averaged"):
         try:

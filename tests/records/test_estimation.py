@@ -113,17 +113,3 @@ def test_a_start_without_a_likelihood_says_why():
     model = Model.define("x", "g*x", {"g": 1.0}, prior={"mean": 1, "variance": 0})
     with pytest.raises(ValueError, match="no density for the measurement of step 0"):
         estimate(model, np.ones((3, 1, 1)), ["g"])
-
-
-def test_a_table_is_a_model_too():
-    table = {
-        "title": "a level",
-        "state": "x + sqrt(q)*v",
-        "meter": "x + w",
-        "parameters": {"q": 0.5},
-    }
-    y = simulate(Model.of_table(table), 1, 60, seed=1).y
-    found, same = (estimate(one, y, "q", "q") for one in (table, Model.of_table(table)))
-    assert found.value == same.value
-    with pytest.raises(ModelError, match="a table with state and meter"):
-        estimate({"state": "x"}, y, "q")

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from kfcourse import Model, read_measurements, simulate
-from kfcourse.records.reading import LARGEST, RecordError, RecordWarning
+from kfcourse import Model, read_measurements
+from kfcourse.records.reading import RecordError, RecordWarning
 from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
@@ -179,7 +179,6 @@ def test_what_is_no_file(tmp_path, monkeypatch):
     (tmp_path / "large.csv").write_text(GOOD)
     with pytest.raises(RecordError, match="more than 10 bytes"):
         read_measurements(tmp_path / "large.csv", WALK)
-    assert LARGEST >= 10**7
 
 
 def test_inputs_of_a_model_are_replaced_by_name():
@@ -188,8 +187,6 @@ def test_inputs_of_a_model_are_replaced_by_name():
         WALK.with_inputs({"b": [1.0]})
     with pytest.raises(ModelError, match="finite"):
         WALK.with_inputs({"a": [np.nan]})
-    x, y = simulate(WALK.with_inputs({"dt": [0.5] * 9, "a": [1.0] * 9}), 1, 9, seed=1)
-    assert np.isfinite(x).all() and np.isfinite(y).all()
 
 
 def test_an_input_holds_until_the_next_one(read):

@@ -91,25 +91,6 @@ def test_leading_axes_broadcast(ensemble):
     np.testing.assert_array_equal(code(x[3], p[0])[0], expected[3])  # no leading axes at all
 
 
-@pytest.mark.parametrize(
-    "constant", [sp.Rational(9, 10), sp.S.Zero, sp.sqrt(2) * sp.exp(1), 2 ** sp.Rational(1, 4)]
-)
-def test_a_constant_output_is_one_value_for_all(constant, ensemble):
-    outputs = {
-        "vector": sp.Matrix([constant]),
-        "matrix": sp.Matrix([[constant, 0], [0, constant]]),
-        "other": sp.Matrix([constant + x1]),
-    }
-    vector, matrix, other = compile_function(
-        "f", ARGUMENTS, outputs, ["x", "vector", "other"]
-    ).function(*ensemble)
-    np.testing.assert_allclose(vector, np.array([float(constant)]), rtol=1e-15)
-    np.testing.assert_allclose(matrix, float(constant) * np.eye(2), rtol=1e-15)
-    assert vector.shape == (1,)
-    assert matrix.shape == (2, 2)
-    assert other.shape == (50, 1)
-
-
 def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
     """A vector is one for each trajectory; what a matrix is made of may come by way of what is
     found once for several entries."""
@@ -119,10 +100,15 @@ def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
         "x_next": sp.Matrix([x1, x2]),
         "of_p": sp.Matrix([[both, both + 1], [both**2, p11]]),
         "of_all": sp.Matrix([[both, x1]]),
+        "constant": sp.Matrix([[sp.sqrt(2)]]),
+        "vector": sp.Matrix([2 ** sp.Rational(1, 4)]),
     }
-    code = compile_function("f", ARGUMENTS, outputs, ["x", "x_next"]).function
-    assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2)]
-    assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2)]
+    code = compile_function("f", ARGUMENTS, outputs, ["x", "x_next", "vector"]).function
+    constants = [(1, 1), (50, 1)]
+    assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2), *constants]
+    assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2), *constants]
+    np.testing.assert_allclose(code(x, p)[3], np.sqrt(2), rtol=1e-15)
+    np.testing.assert_allclose(code(x, p)[4], 2**0.25, rtol=1e-15)
     np.testing.assert_allclose(code(x, p[0])[1], code(x, p)[1][0], rtol=1e-14)
 
 

@@ -20,6 +20,10 @@ def define(**changes):
     )
 
 
+def with_odd(mode):
+    return {"modes": {"sound": MODES["sound"], "odd": mode}}
+
+
 def test_a_mode_is_a_model_of_what_holds_for_all_and_of_what_differs():
     model = JumpModel.define(
         "c*x + v",
@@ -46,26 +50,23 @@ def test_a_single_row_is_a_mode_drawn_anew_at_each_step():
     np.testing.assert_array_equal(model.first, [0.75, 0.25])
 
 
-def test_the_chain_may_depend_on_time_and_parameters():
-    model = define(
-        transition=[["1 - e/(k + 1)", "e/(k + 1)"], ["1", 0]], parameters={"e": 0.5}, interval=0.1
-    )
-    for k in (0, 3, 49):
-        np.testing.assert_allclose(
-            model.transition_at(k), [[1 - 0.5 / (k + 1), 0.5 / (k + 1)], [1, 0]], rtol=1e-14
-        )
-    law = model.first
-    for k in range(5):
-        np.testing.assert_allclose(model.law_at(k), law, rtol=1e-12)
-        law = law @ model.transition_at(k)
-    assert "pi" in model.latex()
-
-
-def test_a_chain_without_time_has_the_law_of_its_powers():
-    law = define().first
+@pytest.mark.parametrize(
+    ("changes", "chain"),
+    [
+        ({}, lambda k: [[0.9, 0.1], [0.3, 0.7]]),
+        (
+            {"transition": [["1 - e/(k + 1)", "e/(k + 1)"], ["1", 0]], "parameters": {"e": 0.5}},
+            lambda k: [[1 - 0.5 / (k + 1), 0.5 / (k + 1)], [1, 0]],
+        ),
+    ],
+)
+def test_the_chain_may_depend_on_time_and_parameters(changes, chain):
+    model, law = define(**changes), [0.8, 0.2]
     for k in range(6):
-        np.testing.assert_allclose(define().law_at(k), law, rtol=1e-12)
-        law = law @ [[0.9, 0.1], [0.3, 0.7]]
+        np.testing.assert_allclose(model.transition_at(k), chain(k), rtol=1e-14)
+        np.testing.assert_allclose(model.law_at(k), law, rtol=1e-12)
+        law = law @ np.array(chain(k))
+    assert "pi" in model.latex()
 
 
 def test_trajectories_follow_the_chain_and_the_mode_in_force():
@@ -142,54 +143,22 @@ def test_averaged_equations():
         ({"first": None}, r"`first` must be 2 probabilities.*; got None"),
         ({"modes": {}}, "`modes` must be a table of modes by name"),
         (
-            {"modes": MODES | {"odd": {"prior": {"mean": 1}}}},
+            with_odd({"prior": {"mean": 1}}),
             "mode odd: modes may differ in state, meter, .* not in prior",
         ),
-        ({"modes": MODES | {"odd": 3}}, "`modes.odd` must be a table"),
-        (
-            {
-                "modes": {
-                    "sound": MODES["sound"],
-                    "odd": {"state": ["x1 + v", "x2"], "parameters": {"C": 1}},
-                }
-            },
-            "mode odd",
-        ),
-        (
-            {
-                "modes": {
-                    "sound": MODES["sound"],
-                    "odd": {"meter": ["x + w", "x"], "parameters": {"C": 1}},
-                }
-            },
-            "measurement component",
-        ),
-        (
-            {"modes": {"sound": MODES["sound"], "odd": {"meter": "x + w1 + w2"}}},
-            r"components or noises; name noises by `symbols`",
-        ),
-        (
-            {
-                "modes": {
-                    "sound": MODES["sound"],
-                    "odd": {"meter": "x + w", "parameters": {"C": "much"}},
-                }
-            },
-            "mode odd: parameter C",
-        ),
+        (with_odd(3), "`modes.odd` must be a table"),
+        (with_odd({"state": ["x1 + v", "x2"], "parameters": {"C": 1}}), "mode odd"),
+        (with_odd({"meter": ["x + w", "x"], "parameters": {"C": 1}}), "measurement component"),
+        (with_odd({"meter": "x + w1 + w2"}), r"components or noises; name noises by `symbols`"),
+        (with_odd({"meter": "x + w", "parameters": {"C": "much"}}), "mode odd: parameter C"),
+        # the chain does not know the noises, nor what differs between the modes
+        ({"transition": [["1 - v", "v"], [0.3, 0.7]]}, r"`transition`: .*unknown symbol 'v'"),
+        ({"transition": [["1 - C/9", "C/9"], [0.3, 0.7]]}, "unknown symbol 'C'"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(changes, message):
     with pytest.raises(ModelError, match=message):
         define(**changes)
-
-
-def test_a_formula_of_the_chain_that_cannot_be_read_is_pointed_at():
-    # the chain does not know the noises
-    with pytest.raises(ModelError, match=r"`transition`: .*unknown symbol 'v'"):
-        define(transition=[["1 - v", "v"], [0.3, 0.7]])
-    with pytest.raises(ModelError, match="unknown symbol 'C'"):  # it differs between the modes
-        define(transition=[["1 - C/9", "C/9"], [0.3, 0.7]])
 
 
 def test_names_of_modes_are_set_as_text():

@@ -96,42 +96,44 @@ def test_slopes_are_seen_in_directions_without_variance(kind, units):
     np.testing.assert_allclose(R[0], 0, atol=1e-20)
 
 
-@pytest.mark.parametrize(
-    ("state", "meter", "size"),
-    [
-        ("x/(1 + x**2) + v", "x**3 + x + w", 1),
-        ("x/(1 + x**2)*v", "x*w1 + exp(x)*w2", 1),  # given x all is known of them
-        ("x + v", "sin(w1)*w2/(1 + x**2)", 3),
-        ("x + v", "x*w1 + w2**2", 2),
-        ("x + v", "x*w1 + sign(x + w2)", 2),
-    ],
-)
-def test_only_noises_that_do_not_enter_linearly_take_points(state, meter, size):
-    assert axes(Model.define(state, meter)) == size
+BOTH = {"mean": [0, 0], "variance": [[1.0, 0.5], [0.5, 1.0]]}
 
 
 @pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
-def test_a_noise_correlated_with_one_that_takes_points_takes_points():
-    both = {"mean": [0, 0], "variance": [[1.0, 0.5], [0.5, 1.0]]}
-    assert axes(Model.define("x + v", "x*w1 + w2**2", meter_noise=both)) == 3
+@pytest.mark.parametrize(
+    ("state", "meter", "laws", "size"),
+    [
+        ("x/(1 + x**2) + v", "x**3 + x + w", {}, 1),
+        ("x/(1 + x**2)*v", "x*w1 + exp(x)*w2", {}, 1),  # given x all is known of them
+        ("x + v", "sin(w1)*w2/(1 + x**2)", {}, 3),
+        ("x + v", "x*w1 + w2**2", {}, 2),
+        ("x + v", "x*w1 + w2**2", {"meter_noise": BOTH}, 3),  # correlated with one that does
+        ("x + v", "x*w1 + sign(x + w2)", {}, 2),
+    ],
+)
+def test_only_noises_that_do_not_enter_linearly_take_points(state, meter, laws, size):
+    assert axes(Model.define(state, meter, **laws)) == size
 
 
 # --- warnings
 
 
+NOT_INTEGRATED = ("exp(x**2)", "abs(x)", "exp(3*x)", "25*x/(1 + x**2)")
+NOT_FINITE = ("log(x)", "sqrt(x)", "exp(exp(exp(5*x)))")
+
+
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
-@pytest.mark.parametrize("term", ["exp(x**2)", "abs(x)", "exp(3*x)", "25*x/(1 + x**2)"])
-def test_what_the_points_do_not_integrate_is_said(kind, term):
-    for state, meter in ((f"{term} + v", "x + w"), ("0.5*x + v", f"{term} + w")):
-        with pytest.warns(QuadratureWarning, match="points an axis"):
+@pytest.mark.parametrize(
+    ("term", "words"),
+    [
+        *((term, "points an axis") for term in NOT_INTEGRATED),
+        *((t, "not finite") for t in NOT_FINITE),
+    ],
+)
+def test_what_the_points_do_not_integrate_is_said(kind, term, words):
+    for state, meter in ((f"{term} + v", "x + w"), ("0.5*x + v", f"x + {term} + w")):
+        with pytest.warns(QuadratureWarning, match=words):
             kind(Model.define(state, meter))
-
-
-@pytest.mark.parametrize("kind", [unscented, gauss_hermite])
-@pytest.mark.parametrize("term", ["log(x)", "sqrt(x)", "exp(exp(exp(5*x)))"])
-def test_what_is_not_finite_at_the_points_is_said(kind, term):
-    with pytest.warns(QuadratureWarning, match="not finite"):
-        kind(Model.define(f"{term} + v", "x + w"))
 
 
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])

@@ -22,9 +22,8 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from kfcourse.errors import expect_not_negative
-from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
+from kfcourse.laws import Array, Gaussian, apply, is_covariance, square_root, symmetric
 from kfcourse.linear.runs import check_prior
-from kfcourse.symbolic.sense import is_covariance
 
 # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to
 # 1e-11 s
