@@ -2,6 +2,7 @@
 published figures."""
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np

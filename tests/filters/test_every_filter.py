@@ -405,18 +405,22 @@ SCALAR = linearised(Model.define("0.9*x + v", "x + w"))
 ANGULAR = linearised(Model.define("x + 0.1*v", "x + 0.1*w", angles={"x": ["x"], "y": []}))
 JUMPING = find_variant("J1").model
 WITHIN_MODES = [gaussian(mode) for mode in JUMPING.modes]
-MEMORY = "a memory holds so many steps, a positive whole number.*got "
+MEMORY = "memory must be a positive whole number, got "
 NAN = float("nan")
 REFUSED = [  # what is called, with what: what the message says
     (lambda p: gated(aof(SCALAR), p), (0, 1, 1.5, NAN), "probability must lie between"),
-    (lambda n: gated(aof(SCALAR), patience=n), (0, 2.0, True, "3"), "patience must be a whole"),
+    (
+        lambda n: gated(aof(SCALAR), patience=n),
+        (0, 2.0, True, "3"),
+        "patience must be a positive whole number",
+    ),
     (lambda d: robust(SCALAR, degrees=d), (0, -1, NAN), "degrees must be positive"),
     (lambda c: robust(SCALAR, edge=c), (0, -1.0, NAN), "edge must be positive"),
-    (lambda n: robust(SCALAR, rounds=n), (0, 1.5, True), "rounds must be a whole number"),
+    (lambda n: robust(SCALAR, rounds=n), (0, 1.5, True), "rounds must be a positive whole number"),
     (
         lambda n: iterated(SCALAR, n),
         (0, 1.5, True, "3", NAN),
-        "iterations must be a whole number, at least 1",
+        "iterations must be a positive whole number",
     ),
     *((partial(of, SCALAR), (1, "2"), "2 or 3 arguments") for of in (fos, mfos)),
     *((partial(of, SCALAR), (0, 2.5, True, "4"), MEMORY) for of in (*OF_MEASUREMENTS, fbp)),
