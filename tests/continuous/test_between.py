@@ -503,6 +503,13 @@ def test_what_such_models_are_not_for():
             other(sampled("-x", "1", "x + w"))
 
 
+@pytest.mark.parametrize("drift", ["x**3", "-500*x"])
+def test_trajectories_that_leave_all_bounds_are_named(drift):
+    """The second by its sub-steps alone: each multiplies the state."""
+    with pytest.raises(NotFinite, match=r"a trajectory passes 1e.100: .*give more `substeps`"):
+        simulate(sampled(drift, "1", "x + w", substeps=10), runs=5, steps=16, seed=1)
+
+
 def test_a_drift_that_explodes_is_named():
     model = sampled("0.01*x**3 - 0.5*x", "1.5", "x + w", prior={"mean": 8}, interval=5)
     with pytest.raises(
