@@ -14,6 +14,7 @@ from pathlib import Path
 
 import contents
 from docutils import nodes
+from figures import ancestors
 from folds import FoldsBelow
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.writers.html5 import HTML5Translator
@@ -202,14 +203,12 @@ def _described(app, pagename: str, context: dict, doctree) -> str:
     )
 
 
-def _boxed(node: nodes.Node) -> bool:
-    while node is not None:
-        if isinstance(
-            node, (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)
-        ) or node.get("classes", []) == ["cell"]:
-            return True
-        node = node.parent
-    return False
+def _boxed(paragraph: nodes.paragraph) -> bool:
+    boxes = (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)
+    return any(
+        isinstance(node, boxes) or node.get("classes", []) == ["cell"]
+        for node in ancestors(paragraph)
+    )
 
 
 def write_not_found(app, exception) -> None:
