@@ -200,7 +200,7 @@ ROOMS = {
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_240,
     "kfcourse/notebooks": 26_120,
-    "kfcourse/pages": 9_580,
+    "kfcourse/pages": 9_550,
     "kfcourse/records": 6_300,
     "kfcourse/scenarios": 11_320,
     "kfcourse/symbolic": 21_800,
