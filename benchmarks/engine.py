@@ -6,9 +6,7 @@ Prints
 - the linearised AOF, random numbers included, against filterpy's extended Kalman filter in a loop;
 - all seven filters of the lab, designed on one ensemble and compared on another, against the time
   one NumPy Generator needs to draw as many normal numbers (four for each trajectory and step), also
-  in processor time, which other work on the machine disturbs less;
-- the same beside the exact one, on one core and on several;
-- how the cost grows with runs and steps, and what share drawing and each filter take.
+  in processor time, which other work on the machine disturbs less.
 
 Absolute figures move with the machine; the ratios are what to keep.  Nothing else should run
 meanwhile.
@@ -24,9 +22,8 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from kfcourse import compare, lab_filters, simulate
-from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.short_names import LAB
 from kfcourse.lab.variants import find_variant
-from kfcourse.montecarlo.ensemble import Ensemble
 
 STEPS = 51
 
@@ -78,17 +75,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--runs", type=int, nargs="+", default=[100_000, 1_000_000])
     parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
     model = find_variant("53").model
     filters = lab_filters(model)
 
-    def lab(
-        names=LAB, runs=options.runs[0], steps=STEPS, jobs=options.threads
-    ) -> Callable[[], object]:
+    def lab(names, runs) -> Callable[[], object]:
         chosen = [one for one in filters if one.name in names]
         return lambda: compare(
-            chosen, model, runs, steps, seed=1, design_runs=runs, jobs=jobs, progress=False
+            chosen, model, runs, STEPS, seed=1, design_runs=runs, jobs=2, progress=False
         )
 
     loop = best(filterpy_loop(200), options.repeats) / (200 * STEPS)
@@ -105,68 +99,13 @@ def main() -> None:
             f"  drawing 4 normals a trajectory-step with one Generator: "
             f"{1e9 * drawing / count:.1f} ns"
         )
-        seven = best(lab(runs=runs), options.repeats)
-        of_seven = best(lab(runs=runs), options.repeats, time.process_time)
+        seven = best(lab(LAB, runs), options.repeats)
+        of_seven = best(lab(LAB, runs), options.repeats, time.process_time)
         print(
             f"  seven filters, designed and run: {1e9 * seven / count:.1f} ns = "
             f"{seven / drawing:.2f} times that,"
         )
-        print(
-            f"    {of_seven / of_drawing:.2f} times in processor time, of {options.threads} threads"
-        )
-
-    print("\nWith the exact filter, 2000 trajectories x 51 steps")
-    filters = lab_filters(model, [*LAB, "aof-exact"])
-    for jobs in (1, 2):
-        print(
-            f"  {jobs} cores: "
-            f"{best(lab([*LAB, 'aof-exact'], 2000, jobs=jobs), options.repeats):.2f} s"
-        )
-
-    print("\nGrowth of the cost of all seven filters")
-    for runs, steps in (
-        (50_000, STEPS),
-        (100_000, STEPS),
-        (200_000, STEPS),
-        (400_000, STEPS),
-        (100_000, 102),
-        (100_000, 204),
-    ):
-        seconds = best(lab(runs=runs, steps=steps), options.repeats)
-        print(
-            f"  {runs:7d} runs x {steps:3d} steps: {seconds:6.2f} s, "
-            f"{1e9 * seconds / (runs * steps):6.1f} ns a trajectory-step"
-        )
-
-    runs = options.runs[0]
-    count = runs * STEPS
-    print(f"\nShares at {runs} x {STEPS}, one thread, ns a trajectory-step")
-
-    def trajectories() -> None:
-        for _ in Ensemble(model, runs, STEPS, np.random.SeedSequence(1)):
-            pass
-
-    print(
-        f"  drawing and simulating one ensemble "
-        f"{1e9 * best(trajectories, options.repeats) / count:8.1f}"
-    )
-
-    def alone(names) -> float:
-        chosen = [one for one in filters if one.name in names]
-        return best(
-            lambda: compare(
-                chosen, model, runs, STEPS, seed=1, design_runs=runs, jobs=1, progress=False
-            ),
-            options.repeats,
-        )
-
-    base = alone(["aof-linearised"])
-    print(f"  with the {title('aof-linearised'):<26} {1e9 * base / count:8.1f}")
-    for name in LAB:
-        if name != "aof-linearised":
-            added = alone(["aof-linearised", name]) - base
-            designed = "" if name.startswith("aof") else " (with a design ensemble of its own)"
-            print(f"  the {title(name):<6} adds {1e9 * added / count:25.1f}{designed}")
+        print(f"    {of_seven / of_drawing:.2f} times in processor time, of two threads")
 
 
 if __name__ == "__main__":

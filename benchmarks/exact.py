@@ -55,12 +55,9 @@ def on_a_grid(y: np.ndarray, a, q, b, r, sd, half_width) -> tuple[np.ndarray, np
     """Means and deviations (steps, runs) on equidistant points, a, b and r as functions of them."""
     x = np.linspace(-half_width, half_width, 4001)
     kernel = np.exp(-0.5 * ((x[:, None] - a(x)) / q) ** 2)
-    density, found = np.exp(-0.5 * (x[:, None] / sd) ** 2), []
+    density, found, spread = np.exp(-0.5 * (x[:, None] / sd) ** 2), [], np.reshape(r(x), (-1, 1))
     for measured in y[..., 0]:
-        density = density * np.exp(
-            -0.5 * ((measured - b(x)[:, None]) / np.reshape(r(x), (-1, 1))) ** 2
-        )
-        density = density / np.reshape(r(x), (-1, 1))
+        density = density * np.exp(-0.5 * ((measured - b(x)[:, None]) / spread) ** 2) / spread
         density /= density.sum(axis=0)
         mean = x @ density
         found.append((mean, np.sqrt(x**2 @ density - mean**2)))
@@ -94,15 +91,12 @@ def main() -> None:
             flush=True,
         )
     linear = Model.define("0.95*x + 0.3*v - 1", "2*x + 0.4*w", prior={"mean": 5.0, "variance": 4.0})
-    known = {
-        "Kalman": (
-            linear,
-            lambda y: (
-                run(kalman_filter(linear), y).mean[..., 0],
-                run(kalman_filter(linear), y).cov[..., 0, 0] ** 0.5,
-            ),
-        )
-    }
+
+    def kalman(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        estimate = run(kalman_filter(linear), y)
+        return estimate.mean[..., 0], np.sqrt(estimate.cov[..., 0, 0])
+
+    known = {"Kalman": (linear, kalman)}
     known |= {
         name: (models[name], lambda y, grid=grid: on_a_grid(y, *grid))
         for name, grid in GRIDS.items()

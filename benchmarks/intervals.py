@@ -117,11 +117,7 @@ def line(name: str, seeds: int, runs: int, steps: int | None, designs: int, jobs
         "{:6.3f} {:6.3f} {:6.2f}".format(*coverage([one[kind] for one in results]))
         for kind in results[0]
     ]
-    moved = (
-        "{:6.2f} {:6.2f}".format(*another_design(filters, model, runs, steps, designs, jobs))
-        if designs > 1
-        else " " * 13
-    )
+    moved = "{:6.2f} {:6.2f}".format(*another_design(filters, model, runs, steps, designs, jobs))
     return f"{name:>12} " + " | ".join([*cells, moved]) + f" | {time.monotonic() - start:6.0f}"
 
 

@@ -18,7 +18,7 @@ from engine import best
 
 from kfcourse import JumpModel, NoClosedForm, simulate
 from kfcourse.filters import Filter, aof
-from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures
+from kfcourse.lab.short_names import JUMP_FILTERS, Structures
 from kfcourse.lab.variants import read_variants
 from kfcourse.laws import Array
 
@@ -42,7 +42,7 @@ def main() -> None:
         if not isinstance(model, JumpModel):
             continue
         structures, y = (
-            JumpStructures(model),
+            Structures(model),
             simulate(model, options.runs, options.steps, seed=1).y,
         )
 

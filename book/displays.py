@@ -13,7 +13,7 @@ from pathlib import Path
 
 from docutils import nodes
 from equations import BEYOND, COURSE
-from gate.page import Formula, Letters, Said, letters_file, letters_of, mark
+from gate.page import Formula, Letters, Verdict, letters_file, letters_of, mark
 from sphinx.util import logging
 
 from kfcourse.pages import Unverified
@@ -54,7 +54,7 @@ def _made(node: nodes.Node) -> bool:
     return False
 
 
-def _judged(letters: Letters, formula: Formula, node: nodes.Node) -> list[Said]:
+def _judged(letters: Letters, formula: Formula, node: nodes.Node) -> list[Verdict]:
     try:
         return letters.judge(formula)
     except Unverified as reason:
@@ -73,7 +73,7 @@ def _words(words: str) -> nodes.paragraph:
     )
 
 
-def _counted(relations: list[Said]) -> str:
+def _counted(relations: list[Verdict]) -> str:
     """How many relations of a box are computed, and what the others are."""
     computed = sum(relation.computed for relation in relations)
     others = Counter(relation.what for relation in relations if not relation.computed)

@@ -22,12 +22,12 @@ HEAD = """\
 (all-equations)=
 # All equations
 
-Each equation says what it is. A ✓ stands beside what was verified when the book was built:
-SymPy has shown that the two sides are equal, or numbers have been compared to the digits that are
-named. Where the text or a box types a relation, its letters were given numbers, by the package or
-by a plain program, and *both sides computed*. If one of these did not hold, there would be no book.
-The others are definitions, quotations, and statements without proof; they stand here letter by
-letter, and a changed letter stops the build, but nothing shows that they are true.
+Each equation says what it is. A ✓ stands beside what was verified when the book was built: SymPy
+has shown that the two sides are equal, or numbers have been compared to the digits that are
+named. Where the text or a box types a relation, its letters were given numbers, by definitions
+that say them in another way, and *both sides computed*. If one of these did not hold, there would
+be no book. The others are definitions, quotations, and statements without proof; they stand here
+letter by letter, and a changed letter stops the build, but nothing shows that they are true.
 
 In the whole book {total} equations in {chapters} chapters were verified by SymPy, {computed} typed
 relations computed, {others} are said to be something else; {claims} statements in words had their

@@ -45,7 +45,7 @@ def sine_and_lines() -> str:
     model = Model.define("x + 0.1*v", "sin(x) + 0.05*w")
     tangent, best = linearised(model), gaussian(model)
     (angle,), (m,), (d,) = model.x, best.formulas.m, best.formulas.d
-    lines = [(one["h"], one["G"]) for one in (tangent, best)]
+    lines = [(functional["h"], functional["G"]) for functional in (tangent, best)]
     left = (best["F"] - best["G"] ** 2 * d) - (tangent["F"] - tangent["G"] ** 2 * d)
     return explore.two_lines(
         "fig-better-line",
@@ -163,7 +163,7 @@ def state_of(tab, handle_or_slider) -> float:
     return float(handle_or_slider.get_attribute("aria-valuenow") or handle_or_slider.input_value())
 
 
-def said(tab) -> list[float]:
+def numbers_of(tab) -> list[float]:
     """The numbers of the status line: in their order."""
     text = tab.get_by_role("status").inner_text().replace("−", "-")
     return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]

@@ -47,7 +47,8 @@ def offline(browser):
         tab.on("pageerror", lambda error: problems.append(str(error)))
         own = (path.as_uri(), "blob:", "data:")
         tab.on(
-            "request", lambda one: one.url.startswith(own) or problems.append(f"loads {one.url}")
+            "request",
+            lambda request: request.url.startswith(own) or problems.append(f"loads {request.url}"),
         )
         return tab
 

@@ -16,5 +16,6 @@ def variant53() -> Model:
 def no_figures(monkeypatch):
     """Drawing takes most of the time of a report; for tests of its text, and of what becomes of
     files."""
-    monkeypatch.setattr(report, "FIGURES", dict.fromkeys(report.FIGURES, lambda *_, **__: None))
+    nothing = dict.fromkeys(report.plots.FIGURES, lambda *_, **__: None)
+    monkeypatch.setattr(report.plots, "FIGURES", nothing)
     monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())

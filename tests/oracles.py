@@ -57,13 +57,13 @@ def mixture(weights, laws):
     return mean, sum(w * P for w, P in zip(weights, spread, strict=True))
 
 
-def steps_of(one, count):
+def steps_of(system, count):
     """(A, constant, Q, H, constant, R) of the first steps of x' = A x + B v + a, y = H x + C w + b,
-    whose matrices `one.at` and laws `one.laws` tell: what the two references below take."""
-    _, (m_v, D_v), (m_w, D_w) = one.laws.values()
+    with matrices `system.at` and laws `system.laws`: what the two references below take."""
+    _, (m_v, D_v), (m_w, D_w) = system.laws.values()
     return [
         (A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T)
-        for A, B, a, H, C, b in map(one.at, range(count))
+        for A, B, a, H, C, b in map(system.at, range(count))
     ]
 
 
@@ -119,6 +119,11 @@ def joint_posterior(steps, prior, y):
     return np.array([mean[b] for b in blocks]), np.array([cov[b, b] for b in blocks]), log_density
 
 
+def as_tables(laws):
+    """Laws (mean, covariance) by name as a model takes them."""
+    return {key: {"mean": mean, "variance": cov} for key, (mean, cov) in laws.items()}
+
+
 class Changing:
     """A linear model whose matrices, constants and noises change with time and input; as text, and
     as arrays typed apart."""
@@ -147,5 +152,5 @@ class Changing:
             "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1",
         ]
         meter = ["x1 + 0.1*k*x2 + (2 if t < 1 else 1)*w1 + u**2", "x2 + w2 + cos(t)"]
-        laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
+        laws = as_tables(self.laws)
         return Model.define(state, meter, inputs={"u": self.U}, interval=0.5, **laws)

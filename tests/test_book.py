@@ -85,9 +85,9 @@ def loaded(page: str) -> Resources:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_page_exists_and_loads_only_local_files(page: str) -> None:
-    found = loaded(page).found
-    assert found, "no style sheet and no script: not a page of this book"
-    for address in found:
+    matched = loaded(page).found
+    assert matched, "no style sheet and no script: not a page of this book"
+    for address in matched:
         if address.startswith("data:"):
             continue
         assert not re.match(r"([a-z]+:)?//", address), f"{page} loads {address} from the network"
@@ -124,8 +124,8 @@ def test_no_notebook_is_left_out() -> None:
 
 @pytest.fixture(scope="module")
 def browser():
-    with chromium() as one:
-        yield one
+    with chromium() as each:
+        yield each
 
 
 @pytest.fixture(scope="module")
@@ -582,32 +582,35 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
 
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
-    found = re.search(
+    matched = re.search(
         r'class="kf-count" href="(equations[^"#]*.html)#([^"]+)"',
         (HTML / f"{page}.html").read_text(encoding="utf-8"),
     )
-    if found:
-        assert f'id="{found[2]}"' in (HTML / found[1]).read_text(encoding="utf-8")
+    if matched:
+        assert f'id="{matched[2]}"' in (HTML / matched[1]).read_text(encoding="utf-8")
 
 
 def displayed(page: str) -> list[str]:
     """The displayed formulas of a page in the letters of their MathML, without what only aligns or
     numbers them."""
-    found = re.findall(
+    matched = re.findall(
         r'<math display="block".*?</math>',
         (HTML / f"{page}.html").read_text(encoding="utf-8"),
         re.DOTALL,
     )
     return [
-        "".join(unescape(one).strip() for one in re.split("<[^>]*>", formula)) for formula in found
+        "".join(unescape(each).strip() for each in re.split("<[^>]*>", formula))
+        for formula in matched
     ]
 
 
 def test_the_pages_of_all_equations_have_them_all():
     """Whether typed, verified, or printed from the package: numbered or not."""
     known = set(displayed("equations")) | set(displayed("equations-beyond"))
-    assert [(page, one) for page in NOTEBOOKS for one in displayed(page) if one not in known] == []
-    assert any("Lk+1=Cov(" in one for one in known)  # of the modified filter of optimal structure
+    assert [
+        (page, each) for page in NOTEBOOKS for each in displayed(page) if each not in known
+    ] == []
+    assert any("Lk+1=Cov(" in each for each in known)  # of the modified filter of optimal structure
     assert len(known) > 250
 
 
@@ -650,14 +653,14 @@ def test_search_finds_sections_and_quotes_them(window, words, page, section):
     tab.goto((HTML / "search.html").as_uri() + f"?q={quote(words)}")
     rows = tab.locator("#search-results li")
     rows.first.wait_for()
-    found = [
+    matched = [
         urlsplit(address)
         for address in rows.locator("a").evaluate_all("links => links.map((link) => link.href)")
     ]
     assert (page, section) in [
-        (place.path.partition("/html/")[2], place.fragment) for place in found[:5]
+        (place.path.partition("/html/")[2], place.fragment) for place in matched[:5]
     ]
-    assert all((HTML / unquote(place.path).partition("/html/")[2]).exists() for place in found)
+    assert all((HTML / unquote(place.path).partition("/html/")[2]).exists() for place in matched)
     assert all(row.locator("p").inner_text() for row in rows.all()[:5])
     # of five: not where only a title has the words
     assert tab.locator("#search-results mark").count() > 1

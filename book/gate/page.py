@@ -9,12 +9,12 @@ beside it::
     LETTERS = (course, western)  # a relation must hold in one of them, with all its letters
     # what cannot be computed, letter by letter, and what it is; or by its label: computed all the
     # same, but shown under this name
-    SAID = {DEFINITION: [r"x_0\sim\mathcal N(m_0,D_0)", "eq-my-model"]}
+    DECLARED = {DEFINITION: [r"x_0\sim\mathcal N(m_0,D_0)", "eq-my-model"]}
     # a string in a cell, and what the checked sides beside it say
     EQUALS = {r"\det M": r"ad-bc"}
 
-So a changed letter stops the build: what is computed no longer holds, or what was said is no longer
-there.
+So a changed letter stops the build: what is computed no longer holds, or what was declared is no
+longer there.
 
 The key points of a page say again what it has shown: a formula in them is computed, or stands
 elsewhere on the page, letter by
@@ -74,7 +74,7 @@ class Formula(NamedTuple):
     label: str = ""
 
 
-class Said(NamedTuple):
+class Verdict(NamedTuple):
     """A piece of a formula, and what it is."""
 
     piece: str
@@ -98,7 +98,7 @@ class Letters:
     ) -> None:
         makers = [world(entry) if isinstance(entry, str) else entry for entry in worlds]
         self.worlds = [[make(np.random.default_rng(seed)) for seed in _SEEDS] for make in makers]
-        self.said = {normal(text): what for what, texts in verdicts.items() for text in texts}
+        self.declared = {normal(text): what for what, texts in verdicts.items() for text in texts}
         self.equals = {
             normal(text): f"{normal(text)} = {normal(other)}" for text, other in equals.items()
         }
@@ -119,12 +119,12 @@ class Letters:
     def listed(self) -> list[str]:
         """What a page must have, as its file speaks of it."""
         return [
-            *(text for text in self.said if text not in map(normal, self.labels)),
+            *(text for text in self.declared if text not in map(normal, self.labels)),
             *self.labels,
             *self.equals.values(),
         ]
 
-    def judge(self, formula: Formula, elsewhere: str = "") -> list[Said]:
+    def judge(self, formula: Formula, elsewhere: str = "") -> list[Verdict]:
         """What each relation of a formula is; a key point may say what stands elsewhere on the
         page.
 
@@ -134,8 +134,8 @@ class Letters:
             If one does not hold, or nothing says what it is.
         """
         whole = normal(formula.latex)
-        if whole in self.said:
-            return [Said(whole, self.said[whole], False)]
+        if whole in self.declared:
+            return [Verdict(whole, self.declared[whole], False)]
         if whole in self.equals:
             return [self._judged(self.equals[whole], formula)]
         if formula.kind in ("side", "name"):
@@ -143,7 +143,7 @@ class Letters:
                 _unsaid(
                     formula.latex,
                     "it is printed beside a checked equation, and nothing holds it; EQUALS or "
-                    "SAID may",
+                    "DECLARED may",
                 )
             )
         if formula.kind == "point":
@@ -169,21 +169,21 @@ class Letters:
             left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right)
         )
 
-    def _judged(self, piece: str, formula: Formula) -> Said:
-        if piece in self.said:
-            return Said(piece, self.said[piece], False)
+    def _judged(self, piece: str, formula: Formula) -> Verdict:
+        if piece in self.declared:
+            return Verdict(piece, self.declared[piece], False)
         if not is_relation(piece):
             raise Unverified(_unsaid(piece, "an expression that is no relation"))
         unread = self._against(piece)
         if unread is None:
-            return Said(piece, self.labels.get(formula.label, COMPUTED), True)
+            return Verdict(piece, self.labels.get(formula.label, COMPUTED), True)
         raise Unverified(_unsaid(piece, unread or "the page has no letters"))
 
-    def read(self, piece: str) -> list[Said]:
+    def read(self, piece: str) -> list[Verdict]:
         """What a relation in a sentence is, if it can be read."""
-        if piece in self.said:
-            return [Said(piece, self.said[piece], False)]
-        return [Said(piece, COMPUTED, True)] if self._against(piece) is None else []
+        if piece in self.declared:
+            return [Verdict(piece, self.declared[piece], False)]
+        return [Verdict(piece, COMPUTED, True)] if self._against(piece) is None else []
 
     @cache  # noqa: B019
     def _against(self, piece: str) -> str | None:
@@ -233,7 +233,9 @@ def _sets(piece: str) -> bool:
 
 
 def _unsaid(latex: str, why: str) -> str:
-    to_do = "give its letters numbers in LETTERS of the page's file in letters/, or list it in SAID"
+    to_do = (
+        "give its letters numbers in LETTERS of the page's file in letters/, or list it in DECLARED"
+    )
     return f"nothing says what this is: {latex}\n  {why}\n  {to_do}"
 
 
@@ -259,7 +261,7 @@ def letters_of(page: Path) -> Letters:
     spec.loader.exec_module(module)
     return Letters(
         getattr(module, "LETTERS", ()),
-        getattr(module, "SAID", {}),
+        getattr(module, "DECLARED", {}),
         getattr(module, "EQUALS", {}),
     )
 
@@ -391,7 +393,7 @@ def _typed(sentence: ast.expr) -> Iterator[str]:
             yield node.value
 
 
-def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[Said]]]:
+def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[Verdict]]]:
     """The formulas of a page, each with what its relations are; another text may take the place of
     the page's."""
     letters = letters_of(page)
@@ -409,7 +411,7 @@ def outside_points(text: str) -> str:
     return "|".join(f" {normal(latex)} " for latex in typed)
 
 
-def mark(verdicts: Sequence[Said]) -> str:
+def mark(verdicts: Sequence[Verdict]) -> str:
     """The words under a display: what its relations are, each once."""
     computed = "✓ " if verdicts and all(entry.computed for entry in verdicts) else ""
     return computed + "; ".join(dict.fromkeys(entry.what for entry in verdicts))

@@ -68,7 +68,7 @@ def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Pl
             if changed:
                 after = formula._replace(latex=changed)
                 # What is listed as said and not there fails test_relations.py.
-                seen = piece in letters.said or noticed(letters, after, elsewhere)
+                seen = piece in letters.declared or noticed(letters, after, elsewhere)
                 yield Planted(page.stem, formula.kind, kind, piece, changed, seen)
 
 

@@ -462,13 +462,15 @@ class Reader:
         variable = self._variable()
         around = self.bound, self.ends
         self.bound, self.ends = (*self.bound, variable), (*self.ends, variable)
-        self.at[variable] = (a + b) / 2 + (b - a) / 2 * NODES
+        inner = np.ndim(a + b) > 0  # a limit is a variable of the integral around
+        nodes, weights = (each[:, None, None] if inner else each for each in (NODES, WEIGHTS))
+        self.at[variable] = (a + b) / 2 + (b - a) / 2 * nodes
         body = self.product()
         del self.at[variable]
         self.bound, self.ends = around
         self.take("d")
         self.place += len(variable.split())
-        return self.compute(lambda: (b - a) / 2 * float(np.sum(WEIGHTS * body)))
+        return self.compute(lambda: (b - a) / 2 * np.sum(weights * body, axis=0).squeeze())
 
     def _variable(self) -> str:
         """The variable of the integral that begins here: what follows the next d outside of

@@ -4,6 +4,7 @@ relations."""
 from __future__ import annotations
 
 import re
+from functools import cache
 
 RELATIONS = {"=", r"\approx", r"\le", r"\ge", "<", ">", r"\propto", r"\leftarrow"}
 _OTHERS = {r"\sim", r"\ll", r"\gg", r"\to", r"\in", r"\ne", r"\gtrsim", r"\lesssim"}  # not computed
@@ -60,6 +61,7 @@ def _scripted(latex: str, place: int) -> bool:
     return latex[:place].rstrip().endswith(("_", "^", "_{", "^{"))
 
 
+@cache
 def normal(latex: str) -> str:
     """One way of writing what TeX prints alike: no space, no braces around a single token."""
     before, text = None, " ".join(tokens(latex))

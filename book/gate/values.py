@@ -88,10 +88,9 @@ def multiplied(left: Value, right: Value) -> Value:
 
 
 def divided(left: Value, right: Value) -> Value:
-    right = np.asarray(right, float)
     if is_matrix(right):
         raise Unverified("a matrix cannot divide")
-    return left / (right.item() if right.size == 1 else right)
+    return left / (np.asarray(right).item() if np.size(right) == 1 else right)
 
 
 def inverse(value: Value) -> Value:
@@ -109,7 +108,7 @@ def root(value: Value) -> Value:
 def raised(value: Value, power: Value) -> Value:
     if is_matrix(value):
         return np.linalg.matrix_power(value, whole(power))
-    return np.asarray(value, float) ** power  # a root of a negative number is NaN
+    return np.multiply(value, 1.0) ** power  # a root of a negative number is NaN
 
 
 def block(rows: list[list[Value]]) -> np.ndarray:

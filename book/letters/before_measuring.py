@@ -2,16 +2,14 @@
 scaled; a small index."""
 
 from gate.page import NOTATION
-from gate.worlds import kalman_run
-
-from kfcourse.filters.alphabeta import steady_beta
+from gate.shared import KALMAN
 
 scaled = r"""
 A: any 3 3
 H: any 1 3
 \Psi, Q: cov 3
 R: cov 1
-c: pos
+c: in .5 2
 \Psi' = A(\Psi^{-1}+H^TR^{-1}H)^{-1}A^T+Q
 \Psi'_c = A((c\Psi)^{-1}+H^T(cR)^{-1}H)^{-1}A^T+cQ
 keep: c, \Psi', \Psi'_c
@@ -28,7 +26,7 @@ keep: \lim_{\Lambda\to0}, \Lambda, \alpha
 
 
 steady = r"""
-\Delta, \sigma, \sigma_a: pos
+\Delta, \sigma, \sigma_a: in .5 2
 A = \begin{pmatrix}1&\Delta\\0&1\end{pmatrix}
 H = \begin{pmatrix}1&0\end{pmatrix}
 E = \begin{pmatrix}0&1\end{pmatrix}
@@ -51,13 +49,30 @@ keep: p_{11}, p_{12}, p_{22}, \psi_{12}, \sigma_r, \alpha(\Lambda), \Lambda, \si
 """
 
 
-def small_gains(rng):
-    alpha = rng.uniform(0.05, 0.1)
-    return {r"\alpha": alpha, r"\beta": steady_beta(alpha)}
+small_gains = r"""
+\alpha: in .05 .1
+\beta = 2(1-\sqrt{1-\alpha})^2
+"""
 
 
-LETTERS = (kalman_run, scaled, small_index, steady, small_gains)
-SAID = {
+run = (
+    KALMAN
+    + r"""
+\lambda = \lambda_2
+\Psi = \Psi_2
+y = y_2
+K = K_2
+z = z_2
+p = p_2
+\nu = \nu_2
+F = F_2
+k: range 1 4
+"""
+)
+
+
+LETTERS = (run, scaled, small_index, steady, small_gains)
+DECLARED = {
     "a setting": ["Q=0"],
     NOTATION: [r"\Psi'_c", r"\psi'_{22}", r"\sigma_r", "p_{22}", r"p_{22}\big|_{\Lambda\to0}"],
 }

@@ -1,46 +1,27 @@
-"""The letters of between-measurements.md: a linear object, its moments by the matrix exponential
-and differences in time."""
+r"""The letters of between-measurements.md: a linear object, its moments by the matrix exponential and
+their rates."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.worlds import column, covariance
-from scipy.linalg import expm
+from gate.shared import LINEAR
 
-
-def course(rng):
-    """A linear object after half a second, rates by differences; then a correction in information
-    form."""
-    A, B, p = rng.normal(size=(2, 2)), rng.normal(size=(2, 2)), covariance(rng, 2)
-    c, start, h = column(rng.normal(size=2)), column(rng.normal(size=2)), 1e-3
-    whole = np.block(
-        [[A, B @ B.T, c], [np.zeros((2, 2)), -A.T, np.zeros((2, 1))], [np.zeros((1, 5))]]
-    )
-
-    def at(t):
-        moved = expm(whole * t)
-        Phi = moved[:2, :2]
-        return Phi @ start + moved[:2, 4:], Phi, moved[:2, 2:4] @ Phi.T
-
-    z, Phi, Q = at(0.5)
-    ahead, after, behind, before = (at(0.5 + step * h) for step in (2, 1, -2, -1))
-    rates = [
-        (8 * (b - c) - (a - d)) / (12 * h)
-        for a, b, d, c in zip(ahead, after, behind, before, strict=True)
-    ]
-    names = {
-        "A": A,
-        "p": p,
-        r"\Phi": Phi,
-        "Q": Q,
-        "I": np.eye(2),
-        r"\mathsf MBB^T": B @ B.T,
-        r"\mathsf Ma": A @ z + c,
-    }
-    return (
-        names
-        | dict(zip((r"\dot z", r"\dot\Phi", r"\dot Q"), rates, strict=True))
-        | {r"\Psi": Phi @ p @ Phi.T + Q}
-    )
+course = (
+    LINEAR
+    + r"""
+p: cov 2
+s: any 2
+m(t) = \Phi(t)s+b(t)
+z = m(0.5)
+\dot z = \operatorname{slope}(m, 0.5)
+\dot\Phi = \operatorname{slope}(\Phi, 0.5)
+\dot Q = \operatorname{slope}(Q, 0.5)
+\Psi = \Phi(0.5)p\Phi(0.5)^T+Q(0.5)
+\Phi = \Phi(0.5)
+Q = Q(0.5)
+"\mathsf MBB^T" = BB^T
+"\mathsf Ma" = Az+c
+keep: A, p, \Phi, Q, \Psi, \dot z, \dot\Phi, \dot Q, \mathsf MBB^T, \mathsf Ma
+"""
+)
 
 
 correction = r"""
@@ -54,7 +35,7 @@ z = \lambda+K(y-h)
 
 
 LETTERS = (course, correction)
-SAID = {
+DECLARED = {
     DEFINITION: [r"dx=a(x,t)\,dt+B(x,t)\,dw", "y_k=b(x(t_k),w_k)"],
     NOTATION: [
         r"\Phi p\Phi^T+Q",

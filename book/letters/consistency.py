@@ -1,13 +1,12 @@
-"""The letters of consistency.md: squares of errors and innovations, in both notations."""
+r"""The letters of consistency.md: squares of errors and innovations, in both notations; means over
+points that have the covariances of the normal laws."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.worlds import covariance
 
 course = r"""
 k: range 4
-F: list 4 pos
-\nu: nums 4
+F: list 4 in .5 2
+\nu: list 4 num
 s_k = \nu_k/\sqrt{F_k}
 """
 
@@ -27,7 +26,7 @@ S: list 4 cov 2
 
 constant_gain = r"""
 K: in .2 .8
-Q, R: pos
+Q, R: in .5 2
 P = Q
 p_f = 1
 again:
@@ -41,37 +40,28 @@ keep: K, P, F, p_f, c, \mathrm{NEES}
 """
 
 
-def spread(cov):
-    """Points with equal weights whose mean is zero and whose covariance is `cov`."""
-    root = np.linalg.cholesky(len(cov) * cov)
-    return [sign * root[:, [i]] for i in range(len(cov)) for sign in (1, -1)]
-
-
-def of_points(rng):
-    """Means over points that have the covariances of the normal laws."""
-    p, P, K, H = covariance(rng, 2), covariance(rng, 3), rng.normal(size=(2, 1)), rng.normal(size=2)
-    Phi, mixed = rng.normal(size=(2, 2)), covariance(rng, 2)
-    H = H[None]
-    joint = np.block([[P[:2, :2], np.zeros((2, 1))], [np.zeros((1, 2)), P[2:, 2:]]])
-    pairs = []
-    for point in spread(joint):
-        e, n = point[:2], point[2:]
-        nu = H @ e + n
-        pairs.append(((H @ Phi @ (e - K @ nu)) * nu, nu * nu, e * nu))
-    product, F, gain = (np.mean(values, axis=0) for values in zip(*pairs, strict=True))
-    nees = [e.T @ np.linalg.solve(p, e) for e in spread(mixed)]
-    traces = [np.trace(np.linalg.solve(p, e @ e.T)) for e in spread(mixed)]
-    means = {
-        r"\mathsf M(e^Tp^{-1}e)": np.mean(nees),
-        r"\mathsf M\operatorname{tr}(p^{-1}ee^T)": np.mean(traces),
-        r"\mathsf M(\nu_{k+1}\nu_k)": product.item(),
-    }
-    known = {"p": p, "P": mixed, "H": H, r"\Phi": Phi, "K": K, "F": F.item(), "K_*": gain / F}
-    return known | means | {r"\operatorname{tr}": np.trace}
+of_points = r"""
+p, P: cov 2
+R = (2P)^{1/2}                   # the points are its columns, with both signs
+"\mathsf M(e^Tp^{-1}e)" = \sum_{i=1}^2(R)_i^Tp^{-1}(R)_i/2
+"\mathsf M\operatorname{tr}(p^{-1}ee^T)" = \sum_{i=1}^2\operatorname{tr}(p^{-1}(R)_i(R)_i^T)/2
+H: any 1 2
+K: any 2 1
+\Phi: any 2 2
+L: cov 2
+r: cov 1
+T = \begin{pmatrix}3L&0\\0&3r\end{pmatrix}^{1/2}
+E = \begin{pmatrix}1&0&0\\0&1&0\end{pmatrix}
+N = \begin{pmatrix}H&1\end{pmatrix}
+F = \sum_{i=1}^3(N(T)_i)^2/3
+K_* = \sum_{i=1}^3E(T)_i(T)_i^TN^T/(3F)
+"\mathsf M(\nu_{k+1}\nu_k)" = \sum_{i=1}^3H\Phi(E(T)_i-KN(T)_i)N(T)_i/3
+forget: R, L, r, T, E, N
+"""
 
 
 LETTERS = (course, western, constant_gain, of_points)
-SAID = {
+DECLARED = {
     NOTATION: [
         r"\chi^2_{N\dim x}/N",
         "Q/R",

@@ -1,238 +1,193 @@
-"""The letters of continuous.md: the package's equations, steps and steady state, with noises that
-are mixed."""
+r"""The letters of continuous.md: the discrete filter in information form, its step, and its rates
+where the step is 0, with noises that are mixed."""
 
-import numpy as np
-import sympy as sp
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import At, Indexed
-from gate.worlds import column, covariance, slope
-from scipy.linalg import expm
 
-from kfcourse.continuous import ContinuousModel, extended_kalman_bucy, steady_state, to_discrete
-from kfcourse.continuous.equations import filter_equations
-from kfcourse.symbolic.structure import linearised
+OBJECT = r"""
+M, E, L, J: any 2 2
+a, b, q, l: any 2
+D, N, S_\xi: cov 2
+z, y: any 2
+I: eye 2
+f(x, t) = Mx+ax^Tx/9
+e(x) = b+Ex+qx^Tx/9
+g(x, t) = J+L(l^Tx)/9
+A = \operatorname{slope}(f, z)
+H = \operatorname{slope}(e, z)
+f = f(z)
+g = g(z)
+W(T) = (D^{-1}+TH^T(N/2)^{-1}H)^{-1}
+P(T) = (I+TA)W(T)(I+TA)^T+TgS_\xi g^T/2
+m(T) = z+W(T)TH^T(N/2)^{-1}(y-e(z))
+p(T) = m(T)+Tf(z)
+\dot z = \operatorname{slope}(p, 0)
+\dot D = \operatorname{slope}(P, 0)
+"""
 
-SIGNAL = ["x1 + 0.2*x2**2", "x2 - 0.3*x1*x2"]
-WEIGHTS = (1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12)  # of a first derivative
-C = np.array([[0.0, 1.0], [1.0, 0.0]])  # picks the components in the other order
+first = (
+    OBJECT
+    + r"""
+c = \begin{pmatrix}0&1\\1&0\end{pmatrix}     # picks the components in the other order
+T = 0.07
+t = 0
+u, \xi: any 2
+d = D
+"D(0)" = D
+"z(0)" = z
+D_\xi = S_\xi/(2T)
+D_n = N/(2T)
+B = W(T)
+z\leftarrow = p(T)
+D\leftarrow = P(T)
+\Psi = (I+TA)D(I+TA)^T+TgS_\xi g^T/2
+x = u
+k: range 1
+"x_k" of k = u
+"x_{k+1}" of k = u+T(f(u)+g(u)\xi)
+"\xi_k" of k = \xi
+"y_k" of k = y
+S(x, t) = e(cx)
+S = e(z)
+o = y
+y(t) = o
+y = o
+F(x, t) = y^TN^{-1}y-(y-e(x))^TN^{-1}(y-e(x))
+F = F(z, 0)
+m = z
+forget: M, E, L, J, a, b, q, l, e, P, p, o, u, W
+"""
+)
 
+in_short = (
+    OBJECT
+    + r"""
+u, w: any 2
+k: range 1
+"x_k" of k = u
+"n_k" of k = w
+"y_k" of k = e(u)+w
+S(x) = e(x)
+S = e(z)
+K = D((N/2)^{-1}H)^T
+"\partial S/\partial x" = H
+keep: x_k, n_k, y_k, k, S, K, D, H, N, S_\xi, A, f, g, y, z, \dot z, \dot D, \partial S/\partial x
+"""
+)
 
-def model(rng, signal=SIGNAL):
-    return ContinuousModel.define(
-        ["0.3*x2 - 0.5*x1 + 0.1*x1*x2", "-0.7*x2 + 0.2*x1**2"],
-        [["0.6 + 0.1*x1", "0.2"], ["0.1*x2", "0.5"]],
-        signal,
-        spectral_density=covariance(rng, 2),
-        noise_density=covariance(rng, 2),
-        prior={"mean": [0.4, -0.2], "variance": covariance(rng, 2)},
-    )
+western = (
+    OBJECT
+    + r"""
+\hat x = z
+\dot{\hat x} = \dot z
+\dot P = \dot D
+F = A
+G = g
+P = D
+h(x) = e(x)
+K = D((N/2)^{-1}H)^T
+Q = S_\xi/2
+R = N/2
+keep: \hat x, \dot{\hat x}, P, \dot P, F, G, h, f, H, K, Q, R, S_\xi, N, y
+"""
+)
 
+stationary = r"""
+A, H, G: any 2 2
+N, S_\xi: cov 2
+I: eye 2
+O = 0I
+Q = GS_\xi G^T/2
+R = H^T(N/2)^{-1}H
+Z = \begin{pmatrix}A^T&-R\\-Q&-A\end{pmatrix}
+again:                      # the matrix sign of the Hamiltonian: (I, D) spans what decays
+Z = (Z+Z^{-1})/2
+then:
+U = \begin{pmatrix}I&O\end{pmatrix}
+V = \begin{pmatrix}O&I\end{pmatrix}
+D = -(UZV^T)^{-1}(UZU^T+I)
+keep: A, H, G, N, S_\xi, D
+"""
 
-def function(own, matrix):
-    computed = sp.lambdify(list(own.x), matrix)
-    return lambda x, t=0: np.array(computed(*np.ravel(x))).reshape(matrix.shape)
-
-
-def rates(own, y, second_derivatives=False):
-    """The package's rates of the prior's mean and covariance, and the letters they are made of; a
-    signal of two arguments is that of the phase."""
-    equations = filter_equations(own, second_derivatives)
-    z, D = column(own.prior.mean), own.prior.cov
-    values = sp.lambdify([*equations.state, *equations.y], equations.rates)(
-        *z.ravel(), *D[np.triu_indices(2)], *y.ravel()
-    )
-    f, S, g = (function(own, part) for part in (own.drift, own.signal, own.diffusion))
-    functions = {
-        "f": At(f, f(z)),
-        "S": At(lambda x, t=None: S(x if t is None else C.T @ x), S(z)),
-        "g": At(g, g(z)),
-    }
-    known = {"z": z, "D": D, "A": slope(f, z), "H": slope(S, z), "N": own.noise_density}
-    known |= {r"S_\xi": own.spectral_density, "I": np.eye(2)}
-    return functions | known | {r"\dot z": values[:2], r"\dot D": values[[[2, 3], [3, 4]], 0]}
-
-
-def first(rng):
-    """The package's discrete model at a random state, and with its measurement the filter's rates
-    and step, the discrete filter's prediction, and the rate of the log-likelihood."""
-    own, T = model(rng), 0.07
-    steps = to_discrete(own, T)
-    x, xi, n = rng.normal(size=(3, 2))
-    here = dict(zip((*steps.x, *steps.v, *steps.w), (*x, *xi, *n), strict=True))
-    x_next, y = (
-        column([float(formula.subs(here)) for formula in side])
-        for side in (steps.state_equation, steps.meter_equation)
-    )
-    known = rates(own, y)
-    z, D, H, N, S = (known[name] for name in "zDHNS")
-    bucy = extended_kalman_bucy(own, T)
-    after = bucy.step(bucy.init(1), y.T).predicted
-    B = D - D @ H.T @ np.linalg.solve(H @ D @ H.T + N / (2 * T), H @ D)
-
-    def F(x, t):
-        """What is left of -(y - S)^T N^-1 (y - S) without its part in y alone."""
-        off = y - S.function(x)
-        return y.T @ np.linalg.solve(N, y) - off.T @ np.linalg.solve(N, off)
-
-    values = {
-        "x": Indexed([column(x), x_next], z),
-        "y": Indexed([y], At(lambda t: y, y)),
-        r"\xi": Indexed([column(xi)]),
-        "n": Indexed([column(n)]),
-        "F": At(F, F(z, 0)),
-    }
-    step = {r"z\leftarrow": column(after.mean), r"D\leftarrow": after.cov.reshape(2, 2), "B": B}
-    names = {"c": C, "t": 0.0, "k": range(1), "T": T, "d": D, "D(0)": D, "m": z, "z(0)": z}
-    noises = {r"D_\xi": steps.state_noise.cov, "D_n": steps.meter_noise.cov}
-    ahead = {r"\Psi": linearised(steps).predict(z.T, D[None]).cov.reshape(2, 2)}
-    return known | values | step | names | noises | ahead
-
-
-def in_short(rng):
-    """With the gain, and without the step."""
-    own = first(rng)
-    del own["T"]
-    K = np.linalg.solve(own["N"] / 2, own["H"] @ own["D"]).T
-    return own | {r"\partial S/\partial x": own["H"], "K": K}
-
-
-def western(rng):
-    own = in_short(rng)
-    names = {
-        "z": r"\hat x",
-        r"\dot z": r"\dot{\hat x}",
-        "D": "P",
-        r"\dot D": r"\dot P",
-        "A": "F",
-        "g": "G",
-        "S": "h",
-    }
-    halves = {"Q": own[r"S_\xi"] / 2, "R": own["N"] / 2}
-    same = {name: own[name] for name in ("H", "K", "y", "f", r"S_\xi", "N")}
-    return same | {name: own[ours] for ours, name in names.items()} | halves
-
-
-def stationary(rng):
-    own = ContinuousModel.define(
-        ["x2 - 0.5*x1", "-0.7*x2 + 0.2*x1"],
-        [["0.6", "0.2"], ["0.1", "0.5"]],
-        ["x1 + 0.2*x2", "x2"],
-        spectral_density=covariance(rng, 2),
-        noise_density=covariance(rng, 2),
-    )
-    names = {"A": own.drift.jacobian(own.x), "G": own.diffusion, "H": own.signal.jacobian(own.x)}
-    matrices = {name: np.array(matrix, dtype=float) for name, matrix in names.items()}
-    return matrices | {
-        "D": steady_state(own).cov,
-        "N": own.noise_density,
-        r"S_\xi": own.spectral_density,
-    }
-
-
-def second(rng):
-    """The package's rates with second derivatives; the gradient and the Hessian of F by complex
-    steps and differences; the covariance with the data and without them, both at one moment."""
-    y = column(rng.normal(size=2))
-    known = rates(model(rng), y, second_derivatives=True)
-    z, D, A, N, S = (known[name] for name in "zDANS")
-
-    def rate(x):
-        return np.linalg.solve(N, 2 * S.function(x)).T @ y - S.function(x).T @ np.linalg.solve(
-            N, S.function(x)
-        )
-
-    def gradient(x):
-        return slope(S.function, x).T @ np.linalg.solve(N, 2 * (y - S.function(x)))
-
-    h = 1e-4
-    U = np.hstack(
-        [  # of the fourth order
-            sum(weight * gradient(z + size * h * e[:, None]) for size, weight in WEIGHTS) / h
-            for e in np.eye(2)
-        ]
-    )
-    row, g = slope(rate, z), known["g"].plain
-    above = D + covariance(rng, 2)
-    dot = A @ above + above @ A.T + g @ known[r"S_\xi"] @ g.T / 2
-    return known | {
-        "u": gradient(z),
-        "U": U,
-        r"\frac{\partial F}{\partial x}": row,
-        r"\frac{\partial}{\partial x}\Bigl(\frac{\partial F}{\partial x}\Bigr)^T": U,
-        r"\partial f/\partial x": A,
-        r"\bar D": above,
-        r"\dot{\bar D}": dot,
-        "E": above - D,
-        r"\dot E": dot - known[r"\dot D"],
-    }
-
+second = (
+    OBJECT
+    + r"""
+\delta: cov 2
+v(x) = 2(E+2qx^T/9)^TN^{-1}(y-e(x))
+r(x) = e(x)^TN^{-1}(2y-e(x))
+u = v(z)
+U = \operatorname{slope}(v, z)
+"\frac{\partial F}{\partial x}" = \operatorname{slope}(r, z)
+"\frac{\partial}{\partial x}\Bigl(\frac{\partial F}{\partial x}\Bigr)^T" = U
+"\partial f/\partial x" = A
+W(T) = (D^{-1}-TU)^{-1}
+m(T) = z+TW(T)v(z)
+P(T) = (I+TA)W(T)(I+TA)^T+TgS_\xi g^T/2
+p(T) = m(T)+Tf(z)
+\dot z = \operatorname{slope}(p, 0)
+\dot D = \operatorname{slope}(P, 0)
+\bar D = D+\delta
+Q(T) = (I+TA)\bar D(I+TA)^T+TgS_\xi g^T/2
+\dot{\bar D} = \operatorname{slope}(Q, 0)
+E = \delta
+\dot E = \dot{\bar D}-\dot D
+forget: M, L, J, a, b, q, l, e, r, P, p, m, v, W
+"""
+)
 
 sizes = r"""
-D, N, S'', s: pos
+D, N, S'', s: in .5 2
 S' = -s
 \varepsilon = \sqrt{(2DS''/N)^2N/2/(2DS'^2/N)}
 keep: D, S', S'', N, \varepsilon
 """
 
+short_gain = r"""
+T = 0.07
+H: any 2 2
+\Psi, N, U: cov 2
+I: eye 2
+K = (\Psi^{-1}+H^T(N/(2T))^{-1}H)^{-1}H^T(N/(2T))^{-1}
+D_+ = (\Psi^{-1}-TU)^{-1}
+"""
 
-def short_gain(rng):
-    """The gain of the package's discrete filter, by a solver, and what the second derivative of F
-    leaves of a covariance, by differences of the exponent."""
-    known = first(rng)
-    Psi, H, T, U = known[r"\Psi"], known["H"], known["T"], covariance(rng, 2)
-    K = np.linalg.solve(H @ Psi @ H.T + known["D_n"], H @ Psi).T
+linear_signal = r"""
+b, y, z: any 2
+H: any 2 2
+N: cov 2
+v(x) = 2H^TN^{-1}(y-b-Hx)
+U = \operatorname{slope}(v, z)
+"""
 
-    def exponent(e):
-        return T * e @ U @ e / 2 - e @ np.linalg.solve(Psi, e) / 2
+scalar = r"""
+a, q, r: in .5 1
+D_0: in 2 3
+t: in .1 .2
+R = \begin{pmatrix}-a&q\\r&a\end{pmatrix}
+u(s) = \operatorname{expm}(Rs)\begin{pmatrix}D_0\\1\end{pmatrix}
+P(s) = \begin{pmatrix}1&0\end{pmatrix}u(s)/(\begin{pmatrix}0&1\end{pmatrix}u(s))
+D = P(t)
+\dot D = \operatorname{slope}(P, t)
+D_\infty = P(60)
+\rho = \sqrt{a^2+qr}
+\delta_0 = D_0-D_\infty
+\delta(t) = P(t)-D_\infty
+\delta = D-D_\infty
+\dot\delta = \dot D
+w(s) = 1/(P(s)-D_\infty)
+\dot w = \operatorname{slope}(w, t)
+w = w(t)
+forget: R, u, P
+"""
 
-    # exact for a square
-    bend = [[exponent(a + b) - exponent(a) - exponent(b) for b in np.eye(2)] for a in np.eye(2)]
-    same = {name: known[name] for name in ("H", "N", "I", r"\Psi", "T")}
-    return same | {"K": K, "U": U, "D_+": -np.linalg.inv(bend)}
-
-
-def linear_signal(rng):
-    """The second derivative of the log-likelihood's rate where the signal is linear, by the slopes
-    of its gradient."""
-    y = column(rng.normal(size=2))
-    known = rates(model(rng, ["x1 + 0.2*x2", "x2 - 0.3*x1"]), y)
-    z, H, N, S = (known[name] for name in "zHNS")
-    U = slope(lambda x: H.T @ np.linalg.solve(N, 2 * (y - S.function(x))), z)
-    return {"U": U, "H": H, "N": N}
-
-
-def scalar(rng):
-    """D(t) of the scalar equation, as the quotient of two solutions of a linear one."""
-    a, q, r, D_0, t = *rng.uniform(0.5, 1, size=3), rng.uniform(2, 3), rng.uniform(0.1, 0.2)
-    rates = np.array([[-a, q], [r, a]])
-
-    def D(t):
-        above, below = expm(rates * t) @ [D_0, 1]
-        return above / below
-
-    end, now, dot = D(60), D(t), D(t + 1e-20j).imag / 1e-20
-    delta = now - end
-    known = {"a": a, "q": q, "r": r, "D_0": D_0, "t": t, r"\rho": np.sqrt(a**2 + q * r)}
-    moved = {"D": now, r"\dot D": dot, r"\dot\delta": dot, "w": 1 / delta}
-    return (
-        known
-        | moved
-        | {
-            r"D_\infty": end,
-            r"\delta": At(lambda t: delta, delta),
-            r"\delta_0": D_0 - end,
-            r"\dot w": -dot / delta**2,
-        }
-    )
-
-
-def ranks(rng):
-    """A system that is seen and moved."""
-    A, mu = covariance(rng, 3), rng.uniform(1, 2)
-    known = {"A": A - 2 * np.eye(3), r"\mu": mu, "I": np.eye(3), "n": 3}
-    parts = {"H": rng.normal(size=(2, 3)), "G": rng.normal(size=(3, 2))}
-    return known | parts | {r"\operatorname{rank}": np.linalg.matrix_rank}
-
+ranks = r"""
+n = 3
+I: eye 3
+C: cov 3
+A = C-2I
+\mu: in 1 2
+H: any 2 3
+G: any 3 2
+"""
 
 LETTERS = (
     first,
@@ -246,7 +201,7 @@ LETTERS = (
     sizes,
     linear_signal,
 )
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"\mathsf D\Bigl[\textstyle\frac1T\int_0^Tn\,dt\Bigr]"
         r"=\frac1{T^2}\int_0^T\!\!\int_0^T\frac N2\delta(t-t')\,dt'dt",

@@ -1,42 +1,22 @@
-"""The letters of cycle-slips.md: the mean time to a slip by Pontryagin's equation, the loop by
+r"""The letters of cycle-slips.md: the mean time to a slip by Pontryagin's two integrals, the loop by
 iteration."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Of
-from scipy.integrate import quad, solve_ivp
-from scipy.special import iv
 
-
-def mean_time(V, q):
-    """1/q int_0^{2 pi} e^V(x) int_0^x e^-V(s) ds dx: Pontryagin's solution with tau = 0 at +-2
-    pi."""
-
-    def inner(x):
-        return quad(lambda s: np.exp(-V(s)), 0, x, epsabs=0, epsrel=1e-12, limit=200)[0]
-
-    halves = (0, np.pi), (np.pi, 2 * np.pi)
-    return (
-        sum(
-            quad(lambda x: np.exp(V(x)) * inner(x), *half, epsabs=0, epsrel=1e-11, limit=400)[0]
-            for half in halves
-        )
-        / q
-    )
-
-
-def slips(rng):
-    variance, q = rng.uniform(0.06, 0.12), rng.uniform(0.01, 0.1)
-
-    def V(x):
-        return (1 - np.cos(x)) / variance
-
-    known = {r"\tau": mean_time(V, q), "q": q, r"\sigma_\varphi": np.sqrt(variance)}
-    return known | {"V": Of(V, r"\Delta"), "I_0": lambda x: iv(0, x)}
+slips = r"""
+v: in .06 .12
+q: in .01 .1
+\sigma_\varphi = \sqrt v
+"V" of \Delta = (1-\cos\Delta)/v
+b(x) = \int_0^x\exp(-(1-\cos s)/v)ds
+\tau = \int_0^{2\pi}\exp((1-\cos x)/v)b(x)dx/q      # 0 at +-2 pi
+I_0(x) = \int_0^\pi\exp(x\cos t)dt/\pi
+forget: v, b
+"""
 
 
 loop = r"""
-A, D_n: pos
+A, D_n: in .5 2
 q: in .01 .1
 r = 2\pi D_n/\int_0^{2\pi}(A\sin t)^2dt
 \Psi = 1
@@ -50,36 +30,29 @@ keep: q, r, p, \Psi, \sigma_\varphi, U'
 """
 
 
-def saw(rng):
-    """The potential of a saw, with its edge at half a cycle."""
-    variance, q = rng.uniform(0.05, 0.1), rng.uniform(0.01, 0.1)
+saw = r"""
+v: in .05 .1
+q: in .01 .1
+\sigma_\varphi = \sqrt v
+b(x) = \int_0^x\exp(-s^2/(2v))ds
+c(x) = b(\pi)+\int_\pi^x\exp(-(s-2\pi)^2/(2v))ds         # its edge is at half a cycle
+\tau = (\int_0^\pi\exp(x^2/(2v))b(x)dx+\int_\pi^{2\pi}\exp((x-2\pi)^2/(2v))c(x)dx)/q
+forget: v, b, c
+"""
 
-    def V(x):
-        return ((x + np.pi) % (2 * np.pi) - np.pi) ** 2 / (2 * variance)
 
-    return {r"\tau": mean_time(V, q), "q": q, r"\sigma_\varphi": np.sqrt(variance)}
-
-
-def pushed(rng):
-    """The probability to slip forwards, by its differential equation, q Pi'' + (b - q V') Pi' =
-    0."""
-    q, b, height = rng.uniform(0.5, 1), rng.uniform(0.1, 0.3), rng.uniform(0.5, 1)
-
-    def W(x):
-        return height * (1 - np.cos(x)) + 0.1 * (1 - np.cos(2 * x)) - b * x / q
-
-    def rates(x, state):
-        return [state[1], (height * np.sin(x) + 0.2 * np.sin(2 * x) - b / q) * state[1]]
-
-    begin, end = -2 * np.pi, 2 * np.pi
-    way = solve_ivp(
-        rates, (begin, end), [0, 1], method="DOP853", t_eval=[0, end], rtol=1e-12, atol=1e-14
-    )
-    return {r"\Pi": way.y[0, 0] / way.y[0, 1], "W": Of(W, r"\Delta")}
+pushed = r"""
+q, a: in .5 1
+b: in .1 .3
+"W" of \Delta = a(1-\cos\Delta)+0.1(1-\cos(2\Delta))-b\Delta/q
+R(x) = \exp(\int_0^x(a\sin s+0.2\sin(2s)-b/q)ds)             # q Pi'' + (b - q V') Pi' = 0
+\Pi = \int_{-2\pi}^0R(x)dx/\int_{-2\pi}^{2\pi}R(x)dx
+keep: W, \Pi
+"""
 
 
 carrier = r"""
-q, r: pos
+q, r: in .5 2
 p = 1
 again:
 p = (p+qr/p)/2
@@ -90,7 +63,7 @@ V(x) = (1-\cos(x))/p
 
 
 LETTERS = (slips, loop, saw, pushed, carrier)
-SAID = {
+DECLARED = {
     DEFINITION: [r"\Delta_{k+1}=\Delta_k-p\,U(\Delta_k)-p\,\tilde n_k+s_\varphi v_k"],
     NOTATION: ["2D_n/A^2", r"1/\sigma_\varphi^2"],
     CONDITION: [r"\tau(2\pi)=0"],

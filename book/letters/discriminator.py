@@ -1,16 +1,7 @@
 """The letters of discriminator.md: a loop with several components in the gain form, and the
 characteristic of a carrier."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.worlds import covariance, slope
-
-C = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-
-
-def S(phi):
-    return np.array([[phi[0, 0] + 0.2 * phi[1, 0] ** 2], [phi[0, 0] * phi[1, 0] + phi[1, 0]]])
-
 
 run = r"""
 c: any 2 3
@@ -51,7 +42,7 @@ forget: E, b, d, M, a, l, P, s, Q, H, K, v, T
 
 
 carrier = r"""
-A, D_n, T, \lambda, \Delta, p_{\varphi\varphi}: pos
+A, D_n, T, \lambda, \Delta, p_{\varphi\varphi}: in .5 2
 U(x) = \int_0^{2\pi}A\sin(t)A(\cos(t)-\cos(t+x))dt/(2\pi D_n)
 U_{\max} = U(\pi/2)
 \Delta f_{\max} = U_{\max}p_{\varphi\varphi}/T/(2\pi)
@@ -77,24 +68,26 @@ keep: p_{\varphi\varphi}, p_{\nu\varphi}, U, \Delta, \delta, a, T
 """
 
 
-def log_likelihood(rng):
-    """Its slopes by complex steps, by the state and by what enters the signal."""
-    x, y, D_n = rng.normal(size=(3, 1)), rng.normal(size=(2, 1)), covariance(rng, 2)
-
-    def L(phi):
-        return -(y - S(phi)).T @ np.linalg.solve(D_n, y - S(phi)) / 2
-
-    slopes = {
-        r"\frac{\partial L}{\partial\varphi}": slope(L, C @ x),
-        r"\frac{\partial L}{\partial x}": slope(lambda x: L(C @ x), x),
-        r"\frac{\partial S}{\partial\varphi}": slope(S, C @ x),
-    }
-    known = {"L": L, r"\varphi": C @ x, "c": C, "x": x}
-    return slopes | known | {"D_n": D_n, "y": y, "S": S(C @ x)}
+log_likelihood = r"""
+c: any 2 3
+x: any 3
+E: any 2 2
+b, d, y: any 2
+D_n: cov 2
+S(f) = b+Ef+df^Tf/9
+L(f) = -(y-S(f))^TD_n^{-1}(y-S(f))/2
+e(x) = L(cx)
+\varphi = cx
+"\frac{\partial L}{\partial\varphi}" = \operatorname{slope}(L, \varphi)
+"\frac{\partial L}{\partial x}" = \operatorname{slope}(e, x)
+"\frac{\partial S}{\partial\varphi}" = E+2d\varphi^T/9
+S = S(\varphi)
+forget: E, b, d, e
+"""
 
 
 LETTERS = (run, carrier, drifting, log_likelihood)
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"\varphi_{k+1}=\varphi_k+T\nu_k+s_\varphi v_{1,k}",
         r"\nu_{k+1}=\nu_k+s_\nu v_{2,k}",

@@ -1,96 +1,79 @@
-"""The letters of filters-that-remember.md: a filter that remembers two measurements, as a plain
-program with NumPy's fits."""
+r"""The letters of filters-that-remember.md: a filter that remembers two measurements, fitted on a
+sample by second moments, and the recursion over the length of its window."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed
 
-STEPS, RUNS = 6, 80
+windowed = r"""
+x_1, y_1: sample 80          # the means below are those of a sample
+v, w: list 6 sample 80
+C(x, y) = \mathsf M(x-\mathsf Mx)(y-\mathsf My)
+k: range 6
+x_0 = x_1
+y_k = x_k+0.1x_k^2+0.4w_k
+x_{k+1} = 0.9x_k+0.2\sin(x_k)+0.3v_k
+d_k = y_k-\mathsf My_k
+k: range 1 5
+o = \begin{pmatrix}1+0x_1\end{pmatrix}
+a = \begin{pmatrix}1\\0\end{pmatrix}
+b = \begin{pmatrix}0\\1\end{pmatrix}
+\lambda_1 = 0x_1
+\Psi_1 = 1+0x_1
+h_k = \lambda_k+0.1(\lambda_k^2+\Psi_k)
+G_k = 1+0.2\lambda_k
+F_k = G_k^2\Psi_k+0.02\Psi_k^2+0.16
+\sigma_k = \Psi_kG_k/F_k(y_k-h_k)
+H_k = C(x_k-\lambda_k,\sigma_k)/C(\sigma_k,\sigma_k)
+e_k = \mathsf M(x_k-\lambda_k-H_k\sigma_k)
+z_k = \lambda_k+\mathsf M(x_k-\lambda_k)+H_k(\sigma_k-\mathsf M\sigma_k)
+\zeta_k = \begin{pmatrix}y_k\\y_{k-1}\end{pmatrix}
+D_k = \begin{pmatrix}d_k\\d_{k-1}\end{pmatrix}
+\Gamma_k = \begin{pmatrix}x_k\end{pmatrix}D_k^T(D_kD_k^T)^{-1}
+\chi_k = (\mathsf Mx_k-\Gamma_k\begin{pmatrix}\mathsf My_k\\\mathsf My_{k-1}\end{pmatrix})o
+u_k = (\mathsf Mx_k)o+\Gamma_kD_k
+q_k = \mathsf Mx_k+(\Gamma_ka)d_k+(\Gamma_kb)d_{k-1}        # u once more, no matrix
+T_k = C(x_k-q_k,x_k-q_k)
+s_k = 0.9q_k+0.2\sin(q_k)\exp(-T_k/2)
+L_{k+1} = C(x_{k+1},s_k)/C(s_k,s_k)
+n_{k+1} = \mathsf M(x_{k+1}-L_{k+1}s_k)
+\lambda_{k+1} = \mathsf Mx_{k+1}+L_{k+1}(s_k-\mathsf Ms_k)
+\Psi_{k+1} = (0.9+0.2\cos(q_k))^2T_k+0.09
+"\tau(u_k,T_k)" of k = s_k
+keep: \lambda, \Psi, \sigma, H, e, z, y, h, G, F, L, n, u, \zeta, \Gamma, \chi, k, \tau(u_k,T_k)
+"""
 
+lengthened = r"""
+c: in .8 .9
+q, R: in .5 1.5
+k: range 6
+p_0 = q/(1-c^2)
+p_{k+1} = 1/(1/(c^2p_k+q)+1/R)
+p_* = 1
+again:
+p_* = 1/(1/(c^2p_*+q)+1/R)
+then:
+p_- = -qR/(c^2p_*)           # the product of the roots
+\varrho = (cR/(c^2p_*+q+R))^2
+D(x) = c^2x+q+R
+\ell: range 1 5
+keep: p, p_*, p_-, \varrho, D, \ell
+"""
 
-def tau(z, p):
-    return 0.9 * z + 0.2 * np.sin(z) * np.exp(-p / 2)
-
-
-def Theta(z, p):
-    return (0.9 + 0.2 * np.cos(z)) ** 2 * p + 0.09
-
-
-def measure(lam, Psi):
-    G = 1 + 0.2 * lam
-    return lam + 0.1 * (lam**2 + Psi), G, G**2 * Psi + 0.02 * Psi**2 + 0.16
-
-
-def fitted(target, *regressors):
-    """Slopes (1, r), offset and the variance left, by least squares."""
-    rows = np.vstack([*regressors, np.ones(RUNS)])
-    fit = np.linalg.lstsq(rows.T, target, rcond=None)[0]
-    return fit[None, :-1], fit[-1], np.var(target - fit @ rows)
-
-
-def windowed(rng):
-    """All parts fitted, but the variance."""
-    x = rng.normal(size=RUNS)
-    lam, Psi, zeta, rows = np.zeros(RUNS), np.ones(RUNS), [], []
-    ahead = None
-    for _ in range(STEPS):
-        y = x + 0.1 * x**2 + 0.4 * rng.normal(size=RUNS)
-        h, G, F = measure(lam, Psi)
-        sigma = Psi * G / F * (y - h)
-        H, e, _ = fitted(x - lam, sigma)
-        z = lam + H.item() * sigma + e
-        zeta = [y, *zeta][:2]
-        Gamma, chi, T = fitted(x, *zeta)
-        u = Gamma @ np.array(zeta) + chi
-        following = 0.9 * x + 0.2 * np.sin(x) + 0.3 * rng.normal(size=RUNS)
-        L, n, _ = fitted(following, tau(u[0], T))
-        before = ahead or (1.0, 0.0)
-        row = {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H.item(), "e": e, "z": z}
-        row |= {"y": y, "h": h, "G": G, "F": F, "L": before[0], "n": before[1], "u": u, "T": T}
-        window = {r"\zeta": np.array(zeta), r"\Gamma": Gamma, r"\chi": np.full((1, RUNS), chi)}
-        rows.append(row | window)
-        ahead = L.item(), n
-        lam, Psi, x = ahead[0] * tau(u[0], T) + n, Theta(u[0], T), following
-    every = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
-    return every | {
-        r"\tau": lambda u, T: tau(u[0], T),
-        r"\Theta": lambda u, T: Theta(u[0], T),
-        "k": range(1, STEPS - 1),
-    }
-
-
-def lengthened(rng):
-    """The variance left by a regression on l measurements at once, and on so many that one more
-    changes nothing."""
-    c, q, R = rng.uniform(0.8, 0.9), *rng.uniform(0.5, 1.5, 2)
-    P = q / (1 - c**2)
-
-    def left(length):
-        lag = np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
-        with_x = P * c ** np.arange(length)
-        return P - with_x @ np.linalg.solve(P * c**lag + R * np.eye(length), with_x)
-
-    end = left(100)
-    kept = c * R / (c**2 * end + q + R)  # c (1 - K)
-    variances = Indexed([P, *(left(length) for length in range(1, 6))])
-    other = -q * R / (c**2 * end)  # the product of the roots
-    numbers = {"p": variances, "p_*": end, "p_-": other, r"\varrho": kept**2, r"\ell": range(1, 5)}
-    return numbers | {"D": lambda p: c**2 * p + q + R}
-
-
-def slow(rng):
-    """A state that hardly forgets, by the recursion over the length of its window."""
-    c, q, R = 1 - 1e-6, rng.uniform(1, 2) * 1e-4, rng.uniform(1, 2)
-    p = [0.0, R / (1 + R * (1 - c**2) / q)]
-    for _ in range(5_000):
-        Psi = c**2 * p[-1] + q
-        p.append(Psi * R / (Psi + R))
-    gone = c * R / (c**2 * p[-1] + q + R)
-    return {"p": Indexed(p), "p_*": p[-1], r"\varrho": gone**2, r"\ell": range(200, 202)}
-
+slow = r"""
+c = 1-0.000001               # a state that hardly forgets
+q: in .0001 .0002
+R: in 1 2
+b = q+R(1-c^2)
+p_* = (\sqrt{b^2+4c^2qR}-b)/(2c^2)
+k: range 1 203
+p_1 = R/(1+R(1-c^2)/q)
+p_{k+1} = 1/(1/(c^2p_k+q)+1/R)
+\varrho = (cR/(c^2p_*+q+R))^2
+\ell: range 200 202
+keep: p, p_*, \varrho, \ell
+"""
 
 LETTERS = (windowed, lengthened, slow)
-SAID = {
+DECLARED = {
     DEFINITION: ["H=1", "e=0", "L=1", "n=0"],
     NOTATION: [
         r"p_k\text{ of the filter begun anew}",

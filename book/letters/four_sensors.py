@@ -34,7 +34,7 @@ keep: \lim_{\sigma_\xi\to0}, \bar p, p, c
 
 
 fixed = r"""
-\sigma_\xi, \sigma_n: pos
+\sigma_\xi, \sigma_n: in .5 2
 K = -0.3
 \bar p = 1
 again:
@@ -44,7 +44,7 @@ then:
 
 
 LETTERS = (analysis, slow_drift, fixed)
-SAID = {
+DECLARED = {
     DEFINITION: [r"\dot s=V", r"\dot h=U", r"\dot V=\xi_1", r"\dot U=\xi_2"],
     "a setting": ["K_k=0"],
     NOTATION: [r"\text{mean innovation}"],

@@ -1,78 +1,69 @@
-"""The letters of grid.md: a filter on a grid as a plain program, and the sum of bells on nodes of
-any distance."""
+r"""The letters of grid.md: a filter on a grid, and the sum of bells on nodes of any distance."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION, STATED
-from gate.values import Indexed, Of, bell
-from gate.worlds import chain_run
+from gate.shared import CHAIN
 
-NODES = 7
-
-
-def bells(rng):
-    """The left side of Poisson's formula is a sum over all nodes, the right a series: both are
-    computed."""
-    h = rng.uniform(1, 2)
-    sigma = h * rng.uniform(0.3, 0.5)
-
-    def normal(x, *law):
-        return bell(x, *(law or (0, sigma**2)))
-
-    return {
-        "h": h,
-        "s": rng.uniform(0, h),
-        r"\sigma": sigma,
-        "j": range(-60, 61),
-        "m": range(1, 3),
-        r"\mathcal N": normal,
-    }
+bells = r"""
+h: in 1 2
+r: in .3 .5
+\sigma = hr
+s: in 0 1
+j: range -60 61
+m: range 1 3
+a = 0
+v = \sigma^2
+\mathcal N(x, a, v) = \exp(-(x-a)^2/(2v))/\sqrt{2\pi v}
+forget: r, a, v
+"""
 
 
-def course(rng):
-    x, h = np.linspace(-3, 3, NODES), 1.0
-    f, g, D_xi, D_n = (
-        (lambda at: 0.8 * at + 0.1),
-        (lambda at: 0.7 + 0.1 * at),
-        rng.uniform(0.8, 1.2),
-        rng.uniform(0.3, 0.6),
-    )
-    P = np.array([[h * bell(to, f(at), g(at) ** 2 * D_xi) for to in x] for at in x])
-    run = chain_run(rng, x, P, h * bell(x, 0.2, 1.0), lambda y, at: bell(y, np.sin(at), D_n))
-    density = Of(lambda j: bell(x[j], 0.2, 1.0), "j")
-    return run | {
-        "f": f,
-        "g": g,
-        "S": np.sin,
-        "h": h,
-        r"D_\xi": D_xi,
-        "D_n": D_n,
-        "p(x_j)": density,
-    }
+course = r"""
+h = 1
+D_\xi: in .8 1.2
+D_n: in .3 .6
+i: range 3
+j: range 3
+"x_j" of j = 1.5(j-1)
+"x_i" of i = 1.5(i-1)
+x_0 = -1.5
+x_1 = 0
+x_2 = 1.5
+f(x) = 0.8x+0.1
+g(x) = 0.7+0.1x
+S(x) = \sin x
+P_{ij} = h\exp(-(1.5(j-1)-f(x_i))^2/(2g^2(x_i)D_\xi))/\sqrt{2\pi g^2(x_i)D_\xi}
+l(y, x) = \exp(-(y-S(x))^2/(2D_n))/\sqrt{2\pi D_n}
+"p(x_j)" of j = \mathcal N(x_j;0.2,1)
+m = h\begin{pmatrix}\mathcal N(x_0;0.2,1)&\mathcal N(x_1;0.2,1)&\mathcal N(x_2;0.2,1)\end{pmatrix}
+"""
+course += (
+    CHAIN
+    + r"""
+forget: l
+"""
+)
 
 
 widths = r"""
-S', f', g, D_n, D_\xi: pos
+S', f', g, D_n, D_\xi: in .5 2
 L(x) = \ln(\mathcal N(0.3;S'x,D_n)\mathcal N(x;0.1,g^2D_\xi)\mathcal N(0.7;f'x,g^2D_\xi))
 \sigma = (2L(0)-L(1)-L(-1))^{-1/2}
 keep: \sigma, S', f', g, D_n, D_\xi
 """
 
 
-def swarm(rng):
-    """Weighted particles; their moments by NumPy."""
-    x, w = rng.normal(size=4), rng.dirichlet(np.ones(4))
-    return {
-        "x": Indexed(x),
-        "w": Indexed(w),
-        "i": range(4),
-        "k": range(2),
-        "z": Indexed([np.average(x, weights=w)] * 2),
-        "p": Indexed([np.cov(x, aweights=w, ddof=0)] * 2),
-    }
+swarm = r"""
+i: range 4
+k: range 2
+x: list 4 num
+w: share 4
+"z_k" of k = \sum_iw_ix_i
+"p_k" of k = \sum_iw_ix_i^2-(\sum_iw_ix_i)^2
+"""
 
 
 LETTERS = (bells, course, widths, swarm)
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"x_{k+1}=x_k+u\Bigl(1+\frac1{1+x_k^2}\Bigr)+\xi_k",
         r"y_k=\sqrt{x_k^2+\rho^2}+n_k",

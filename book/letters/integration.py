@@ -1,44 +1,30 @@
 """The letters of integration.md: the filter of an axis and of three, its Western form with matrices,
 the accelerometer."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Indexed, Of
-from gate.worlds import K_RANGE
 
-SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
-
-
-def sensors(rng):
-    """What the two sensors read, and the error that the slow one has."""
-    lam, eps, n = rng.normal(size=(3, 5))
-    S = [np.sin, np.cos, np.exp, np.tanh, np.cosh]
-    slow, radio = (
-        lam + eps,
-        [signal(value) + noise for signal, value, noise in zip(S, lam, n, strict=True)],
-    )
-    y, at = rng.normal(size=2)
-    step = 1e-20
-    return {
-        r"\lambda": Indexed(lam, at),
-        r"\varepsilon": Indexed(eps),
-        "n": Indexed(n),
-        "S": Indexed(S),
-        "k": K_RANGE,
-        SENSOR: Of(lambda k: slow[k], "k"),
-        RADIO: Of(lambda k: radio[k], "k"),
-        "S'": np.cos,
-        r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": np.sin(
-            y - (y - at + 1j * step)
-        ).imag
-        / step,
-    }
+sensors = r"""
+k: range 1 4
+\lambda: list 5 num
+l: num
+\lambda = l
+\varepsilon, n: list 5 num
+y: num
+"y_{\mathrm{NR},k}" of k = \lambda_k+\varepsilon_k
+"S_k(\lambda_k)" of k = \sin((k+1)\lambda_k)
+"S_k(y_{\mathrm{NR},k}-\varepsilon_k)" of k = \sin((k+1)\lambda_k)
+"y_{\mathrm R,k}" of k = n_k+\sin((k+1)\lambda_k)
+S'(x) = \cos x
+e(x) = \sin(y-x)
+"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)" = \operatorname{slope}(e, y-\lambda)
+forget: y, e, l
+"""
 
 
 axis = r"""
 \sigma_\xi = 0.3
 \sigma_n = 0.7
-V, n, \varepsilon: nums 6
+V, n, \varepsilon: list 6 num
 "y_{\mathrm{SR},k}" of k = V_k+n_k
 "y_{\mathrm{INS},k}" of k = V_k+\varepsilon_k
 k: range 5
@@ -113,7 +99,7 @@ k: range 1 4
 
 
 settled = r"""
-\sigma_\xi, \sigma_n: pos
+\sigma_\xi, \sigma_n: in .5 2
 \Psi = 1
 again:
 \Psi = 1/(1/\Psi+1/\sigma_n^2)+\sigma_\xi^2
@@ -122,7 +108,7 @@ then:
 
 
 stepping = r"""
-T_a, s, V, \varepsilon, y_{\mathrm{NR}}: pos
+T_a, s, V, \varepsilon, y_{\mathrm{NR}}: in .5 2
 v(t) = V+t(y_{\mathrm{NR}}-\varepsilon)
 "s_k" = s+\int_0^{T_a}v(t)dt
 "V_k" = v(T_a)
@@ -163,7 +149,7 @@ keep: \kappa, \sigma_\xi, \sigma_n, \mathsf De
 
 low_pass = r"""
 \kappa: in .3 .6
-V, n, \xi: nums 6
+V, n, \xi: list 6 num
 k: range 5
 \varepsilon_0 = \xi_5
 s_0 = 0
@@ -199,7 +185,7 @@ LETTERS = (
     settled,
     stepping,
 )
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}",
         r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}",

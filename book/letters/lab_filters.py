@@ -1,147 +1,108 @@
-"""The letters of lab-filters.md: three filters on an ensemble as plain programs with NumPy's fits,
-and a run of the package's."""
+r"""The letters of lab-filters.md: three filters on a sample, their fits by second moments, and the
+extended filter of a model with several components."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Of
-from gate.worlds import BENT, K_RANGE, extended_run
+from gate.shared import EXTENDED
 
-from kfcourse.symbolic.structure import linearised
+SAMPLE = r"""
+x_1, y_1: sample 60         # the means below are those of a sample
+v, w: list 6 sample 60
+a(x, v) = 0.9x+0.2\sin x+0.3v
+b(x, w) = x+0.1x^2+0.4w
+C(x, y) = \mathsf M(x-\mathsf Mx)(y-\mathsf My)
+\tau(z, p) = 0.9z+0.2\sin(z)e^{-p/2}
+\Theta(z, p) = (0.9+0.2\cos z)^2p+0.09
+k: range 5
+x_0 = x_1
+x_{k+1} = a(x_k,v_k)
+y_k = b(x_k,w_k)
+"""
 
-STEPS, RUNS = 5, 60
+two_step = (
+    SAMPLE
+    + r"""
+m_v = 0
+m_w = 0
+\lambda_0 = 0x_1
+\omega_k = y_k-b(\lambda_k,0)
+H_k = C(x_k-\lambda_k,\omega_k)/C(\omega_k,\omega_k)
+e_k = \mathsf M(x_k-\lambda_k-H_k\omega_k)
+z_k = x_k-(x_k-\lambda_k-H_k\omega_k-e_k)
+\alpha_k = a(z_k,0)
+F_k = C(x_{k+1},\alpha_k)/C(\alpha_k,\alpha_k)
+g_k = \mathsf M(x_{k+1}-F_k\alpha_k)
+\lambda_{k+1} = \mathsf Mx_{k+1}+F_k(\alpha_k-\mathsf M\alpha_k)
+k: range 1 4
+keep: a, b, m_v, m_w, \lambda, \omega, H, e, z, y, \alpha, F, g, k
+"""
+)
 
+optimal_structure = (
+    SAMPLE
+    + r"""
+\lambda_0 = 0x_1
+\Psi_0 = 1+0x_1
+h_k = \lambda_k+0.1(\lambda_k^2+\Psi_k)
+G_k = 1+0.2\lambda_k
+F_k = G_k^2\Psi_k+0.02\Psi_k^2+0.16
+\sigma_k = \Psi_kG_k/F_k(y_k-h_k)
+H_k = C(x_k-\lambda_k,\sigma_k)/C(\sigma_k,\sigma_k)
+e_k = \mathsf M(x_k-\lambda_k-H_k\sigma_k)
+z_k = x_k-(x_k-\lambda_k-H_k\sigma_k-e_k)
+\Gamma_k = C(x_k,z_k)/C(z_k,z_k)
+\chi_k = \mathsf M(x_k-\Gamma_kz_k)
+u_k = \mathsf Mx_k+\Gamma_k(z_k-\mathsf Mz_k)
+T_k = C(x_k-u_k,x_k-u_k)
+s_{k+1} = \tau(u_k,T_k)
+L_k = C(x_{k+1},s_{k+1})/C(s_{k+1},s_{k+1})
+n_k = \mathsf M(x_{k+1}-L_ks_{k+1})
+\lambda_{k+1} = \mathsf Mx_{k+1}+L_k(s_{k+1}-\mathsf Ms_{k+1})
+\Psi_{k+1} = \Theta(u_k,T_k)
+k: range 1 4
+"\mathrm{Cov}(x_k)" of k = C(x_k,x_k)
+"\mathrm{Cov}(x_k,z_k)" of k = C(z_k,x_k)
+"h" of k = h_k
+"G" of k = G_k
+"F" of k = F_k
+"L" of k = L_k
+"n" of k = n_k
+forget: a, b, C, v, w, x_1, y_1, x, \mathsf M, \mathsf D
+"""
+)
 
-def a(x, v):
-    return 0.9 * x + 0.2 * np.sin(x) + 0.3 * v
+plain_prediction = (
+    optimal_structure
+    + r"""
+"\lambda_{k+1}" of k = \tau(u_k,T_k)
+keep: u, T, \tau, \lambda_{k+1}, k
+"""
+)
 
+second_fit = r"""
+\sigma, \eta: sample 60
+\varepsilon = 0.7\sigma+0.3+\eta
+H = \mathsf M(\varepsilon-\mathsf M\varepsilon)(\sigma-\mathsf M\sigma)/\mathsf D\sigma
+"J(1,0)-J_{\min}" = \mathsf M(\varepsilon-\sigma)^2-\mathsf D(\varepsilon-H\sigma)
+\bar\varepsilon = \mathsf M\varepsilon
+\bar\sigma = \mathsf M\sigma
+"\mathsf D\sigma" = \mathsf D\sigma
+keep: \mathsf D\sigma, H, J(1,0)-J_{\min}, \bar\varepsilon, \bar\sigma
+"""
 
-def b(x, w):
-    return x + 0.1 * x**2 + 0.4 * w
-
-
-def tau(z, p):
-    return 0.9 * z + 0.2 * np.sin(z) * np.exp(-p / 2)
-
-
-def Theta(z, p):
-    return (0.9 + 0.2 * np.cos(z)) ** 2 * p + 0.09
-
-
-def measure(lam, Psi):
-    """h, G, F, to the second order."""
-    G = 1 + 0.2 * lam
-    return lam + 0.1 * (lam**2 + Psi), G, G**2 * Psi + 0.02 * Psi**2 + 0.16
-
-
-def ensemble(rng):
-    x = [rng.normal(size=RUNS)]
-    for _ in range(STEPS):
-        x.append(a(x[-1], rng.normal(size=RUNS)))
-    return x, [b(part, rng.normal(size=RUNS)) for part in x]
-
-
-def fitted(target, regressor):
-    """Slope, offset and the variance left, by NumPy's polynomial fit."""
-    slope, offset = np.polyfit(regressor, target, 1)
-    return slope, offset, np.var(target - slope * regressor - offset)
-
-
-def at_k(values):
-    return Of(lambda k: values[k], "k")
-
-
-def covariance(part, other=None):
-    return np.cov(part, part if other is None else other, bias=True)[0, 1]
-
-
-def collected(rows, **more):
-    known = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
-    return known | {"k": range(1, STEPS - 1)} | more
-
-
-def two_step(rng):
-    """Pugachev's filter."""
-    x, y = ensemble(rng)
-    lam, rows = np.zeros(RUNS), []
-    for k in range(STEPS):
-        omega = y[k] - b(lam, 0)
-        H, e, _ = fitted(x[k] - lam, omega)
-        z = lam + np.polyval([H, e], omega)
-        alpha = a(z, 0)
-        F, g, _ = fitted(x[k + 1], alpha)
-        row = {r"\lambda": lam, r"\omega": omega, "H": H, "e": e, "z": z, "y": y[k]}
-        rows.append(row | {r"\alpha": alpha, "F": F, "g": g})
-        lam = np.polyval([F, g], alpha)
-    return collected(rows, a=a, b=b, m_v=0.0, m_w=0.0)
-
-
-def optimal_structure(rng):
-    """Rudenko's filter, modified: what does without the second fits is the other one."""
-    x, y = ensemble(rng)
-    lam, Psi, rows = np.zeros(RUNS), np.ones(RUNS), []
-    for k in range(STEPS):
-        h, G, F = measure(lam, Psi)
-        sigma = Psi * G / F * (y[k] - h)
-        H, e, _ = fitted(x[k] - lam, sigma)
-        z = lam + np.polyval([H, e], sigma)
-        Gamma, chi, T = fitted(x[k], z)
-        u = np.polyval([Gamma, chi], z)
-        s = tau(u, T)
-        L, n, _ = fitted(x[k + 1], s)
-        row = {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H, "e": e, "z": z}
-        row |= {"h": h, "G": G, "F": F, "L": L, "n": n, r"\Gamma": Gamma, r"\chi": chi}
-        before = tau(rows[-1]["u"], rows[-1]["T"]) if rows else s
-        rows.append(row | {"u": u, "T": T, "x": x[k], "y": y[k], "s": before})
-        lam, Psi = np.polyval([L, n], s), Theta(u, T)
-    known = collected(rows)
-    functions = {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
-    return known | functions | {name: at_k(known[name].values) for name in "hGFLn"}
-
-
-def plain_prediction(rng):
-    """The prediction of the filter of optimal structure, without the second fit."""
-    own = optimal_structure(rng)
-    u, T = own["u"].values, own["T"].values
-    ahead = [tau(*part) for part in zip(u, T, strict=True)]
-    return {
-        "u": own["u"],
-        "T": own["T"],
-        r"\tau": tau,
-        r"\lambda": Indexed([ahead[0], *ahead]),
-        "k": own["k"],
-    }
-
-
-def second_fit(rng):
-    """What a line takes off the mean square that is left without one."""
-    sigma, noise = rng.normal(size=(2, RUNS))
-    error = 0.7 * sigma + 0.3 + noise
-    H, _, left = fitted(error, sigma)
-    gain = {
-        r"J(1,0)-J_{\min}": np.mean((error - sigma) ** 2) - left,
-        r"\mathsf D\sigma": covariance(sigma),
-        "H": H,
-    }
-    return gain | {r"\bar\varepsilon": error.mean(), r"\bar\sigma": sigma.mean()}
-
-
-def optimal(rng):
-    """The package's filter with several components."""
-    own = extended_run(rng, BENT)
-    H, lam, S, structure = own["H"].values, own[r"\lambda"].values, own["S"].plain, linearised(BENT)
-    F = [part @ Psi @ part.T + own["D_n"] for part, Psi in zip(H, own[r"\Psi"].values, strict=True)]
-
-    def moved(z, p):
-        law = structure.predict(z.T, p[None])
-        return law[0].T, law[1].reshape(p.shape)
-
-    functions = {r"\tau": lambda z, p: moved(z, p)[0], r"\Theta": lambda z, p: moved(z, p)[1]}
-    h = [S(place) for place in lam]
-    return (
-        {name: own[name] for name in (r"\lambda", r"\Psi", "K", "z", "p", "y")}
-        | functions
-        | {"G": at_k(H), "F": at_k(F), "h": at_k(h), "k": K_RANGE}
-    )
+optimal = (
+    EXTENDED
+    + r"""
+F_k = H_k\Psi_kH_k^T+D_n
+\tau(z, p) = f(z)
+A(z) = M+2az^T/9
+\Theta(z, p) = A(z)pA(z)^T+gD_\xi g^T
+"G" of k = H_k
+"F" of k = F_k
+"h" of k = S(\lambda_k)
+k: range 1 4
+keep: \lambda, \Psi, K, z, p, y, \tau, \Theta, G, F, h, k
+"""
+)
 
 
 western = r"""
@@ -192,7 +153,7 @@ LETTERS = (
     regression,
     linear_meter,
 )
-SAID = {
+DECLARED = {
     DEFINITION: [
         "x_{k+1}=cx_k+ex_kv_k",
         "y_k=gx_k+fx_k^2w_k",

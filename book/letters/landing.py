@@ -2,7 +2,7 @@
 
 from gate.page import DEFINITION
 
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"\dot x_1=-E-g_0\sin x_2",
         r"E=c_0x_1^2e^{-\beta_0x_3}",

@@ -1,73 +1,80 @@
-"""The letters of linearisation.md: runs of the package's extended filter of a scalar model and of
-vectors, and the same filter in Western letters."""
+r"""The letters of linearisation.md: runs of the extended filter in information form, scalar and with
+vectors, and the same in Western letters."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Indexed, Of
-from gate.worlds import BENT_LATER, BENT_SCALAR, extended_run, given
-from scipy.stats import multivariate_normal
+from gate.shared import EXTENDED
 
+scalar = r"""
+k: range 5
+x, y: list 6 num
+D_n: in .5 2
+f(x) = 0.8x+0.3\sin x
+e(x) = x+0.2x^2
+\lambda_0 = 0.5
+\Psi_0 = 0.4
+h_k = \operatorname{slope}(e, \lambda_k)
+p_k = 1/(1/\Psi_k+h_k^2/D_n)
+K_k = \Psi_kh_k/(h_k^2\Psi_k+D_n)
+\nu_k = y_k-e(\lambda_k)
+z_k = \lambda_k+K_k\nu_k
+d_k = -\nu_k^2/(2(h_k^2\Psi_k+D_n))
+s_k = e(\lambda_k)
+\lambda_{k+1} = f(z_k)
+\Psi_{k+1} = (0.8+0.3\cos z_k)^2p_k+(0.4+0.1z_k)^2
+k: range 1 4
+"S'" of k = h_k
+"S" of k = s_k
+"f_k(z_k)" of k = f(z_k)
+"f_{k-1}(z_{k-1})" of k = f(z_{k-1})
+forget: f, e, h, s
+"""
 
-def at_k(values):
-    return Of(lambda k: values[k], "k")
+vector = (
+    EXTENDED
+    + r"""
+k: range 1 4
+"f_k(z_k)" of k = f(z_k)
+"f_{k-1}(z_{k-1})" of k = f(z_{k-1})
+"g_k" of k = g
+"g_{k-1}" of k = g
+"S_k(\lambda_k)" of k = S(\lambda_k)
+x: any 3
+\lambda = \lambda_2
+\Psi = \Psi_2
+H = H_2
+y = y_2
+z = z_2
+p = p_2
+F = H\Psi H^T+D_n
+J(x) = \ln(\mathcal N(x;\lambda,\Psi)\mathcal N(y;S(x),D_n)/(\mathcal N(x;x,\Psi)\mathcal N(y;y,D_n)))
+forget: M, E, a, l, b, g, P
+"""
+)
 
-
-def _together(run, *names):
-    return zip(*(run[name].values for name in names), strict=True)
-
-
-def scalar(rng):
-    """A run, with the slopes and the noise of the object at the step."""
-    run = extended_run(rng, BENT_SCALAR)
-    S = [run["S"].plain(lam) for lam in run[r"\lambda"].values]
-    off = [nu**2 / (H**2 * Psi + run["D_n"]) for nu, H, Psi in _together(run, r"\nu", "H", r"\Psi")]
-    at_any = {
-        "x": Indexed(rng.normal(size=len(off))),
-        "d": Indexed([-square / 2 for square in off]),
-    }
-    now = {"S'": at_k(run["H"].values), "S": at_k(S)}
-    matrices = ("H", r"\Phi", "I")  # whose transpositions a scalar does not tell
-    return {name: run[name] for name in run if name not in matrices} | at_any | now
-
-
-def vector(rng):
-    run = extended_run(rng, BENT_LATER)
-    x, lam, Psi = rng.normal(size=(3, 1)), run[r"\lambda"].plain, run[r"\Psi"].plain
-    y, S, D_n, H = run["y"].plain, run["S"].plain, run["D_n"], run["H"].plain
-
-    def log_density(off, cov):
-        """Of a normal law, without its constant."""
-        law = multivariate_normal(cov=cov)
-        return law.logpdf(off.ravel()) - law.logpdf(np.zeros(len(off)))
-
-    def J(x):
-        return log_density(x - lam, Psi) + log_density(y - S(x), D_n)
-
-    return run | {"x": x, "J": J, "F": H @ Psi @ H.T + D_n}
-
-
-def western(rng):
-    own = extended_run(rng)
-    x, P = given(own[r"\lambda"], own["z"]), given(own[r"\Psi"], own["p"])
-    g, D_xi, H = own["g"].values, own[r"D_\xi"], own["H"].values
-    S = [
-        slope_ @ cov @ slope_.T + own["D_n"]
-        for slope_, cov in zip(H, own[r"\Psi"].values, strict=True)
-    ]
-    names = {"F": r"\Phi", "R": "D_n", "v": r"\nu", "z": "y"}
-    same = {name: own[name] for name in "KHIk"} | {name: own[old] for name, old in names.items()}
-    return same | {
-        r"\hat x": x,
-        "P": P,
-        "Q": Of(lambda k: g[k] @ D_xi @ g[k].T, "k"),
-        "S": Indexed(S),
-        "f": own["f"].plain,
-        "h": own["S"].plain,
-    }
+western = (
+    EXTENDED
+    + r"""
+k: range 1 4
+"P_{k\mid k}" of k = p_k
+"P_{k\mid k-1}" of k = \Psi_k
+"P_{k+1\mid k}" of k = \Psi_{k+1}
+"\hat x_{k\mid k}" of k = z_k
+"\hat x_{k\mid k-1}" of k = \lambda_k
+"\hat x_{k+1\mid k}" of k = \lambda_{k+1}
+"z_k" of k = y_k
+"v_k" of k = \nu_k
+"F_k" of k = \Phi_k
+"S_k" of k = H_k\Psi_kH_k^T+D_n
+h(x) = S(x)
+R = D_n
+Q = gD_\xi g^T
+forget: M, E, a, l, b, g, S, P, z, y, \lambda, \Psi, p, \nu, \Phi, D_n, D_\xi
+"""
+)
 
 
 even = r"""
-c, g, D_\xi, D_0: pos
+c, g, D_\xi, D_0: in .5 2
 k: range 5
 \Psi_k = c^{2k}D_0+\sum_{i=0}^kc^{2i}g^2D_\xi-c^{2k}g^2D_\xi
 S(x) = \cos x
@@ -106,7 +113,7 @@ LETTERS = (
     pendulum,
     meters,
 )
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
         "y_k=S_k(x_k)+n_k",

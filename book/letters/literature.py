@@ -2,7 +2,7 @@
 
 from gate.page import NOTATION
 
-SAID = {
+DECLARED = {
     NOTATION: [
         r"\rho_1^2",
         "x_3'",

@@ -1,90 +1,60 @@
-"""The letters of looking-back.md: a run of the package's linear filter, and its smoother by one
-regression on all of it."""
+r"""The letters of looking-back.md: a run of the linear filter, what the later measurements say, and
+the smoother made of both; and back step by step."""
 
-import numpy as np
 from gate.page import NOTATION
-from gate.values import Indexed, Of
-from gate.worlds import K_RANGE, column, covariance
+from gate.shared import KALMAN
 
-from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem, run, smooth
+LATER = (
+    KALMAN
+    + r"""
+N_0 = 0I                  # of x_4, x_3, ...: counted from the end
+h_0 = 0z_0
+W_k = N_k+H^TR^{-1}H
+w_k = h_k+H^TR^{-1}y_{4-k}
+N_{k+1} = A^T(W_k-W_k(W_k+Q^{-1})^{-1}W_k)A
+h_{k+1} = A^T(w_k-W_k(W_k+Q^{-1})^{-1}w_k)
+k: range 5
+"""
+)
 
-STEPS, STATES, SEEN = 6, 3, 2
+course = (
+    LATER
+    + r"""
+\bar p_k = (p_k^{-1}+N_{4-k})^{-1}
+\bar z_k = \bar p_k(p_k^{-1}z_k+h_{4-k})
+S_k = (\Psi_{k+1}^{-1}Ap_k)^T
+k: range 1 4
+"A_k" of k = A
+"Q_k" of k = Q
+"\mathrm{Cov}(x_k,x_{k+1})" of k = (Ap_k)^T
+keep: A, A_k, Q_k, I, k, p, z, \lambda, \Psi, S, \bar p, \bar z, \mathrm{Cov}(x_k,x_{k+1})
+"""
+)
 
-
-def _record(rng):
-    A, H = rng.normal(size=(STATES, STATES)), rng.normal(size=(SEEN, STATES))
-    system = LinearSystem(A, H, covariance(rng, STATES), covariance(rng, SEEN))
-    prior, y = (
-        Gaussian(rng.normal(size=STATES), covariance(rng, STATES)),
-        rng.normal(size=(STEPS, 1, SEEN)),
-    )
-    laws = run(system, prior, y)
-    back = smooth(system, laws)
-    letters = {
-        "z": _columns(laws.posterior.mean),
-        "p": Indexed(laws.posterior.cov[:, 0]),
-        r"\bar z": _columns(back.mean),
-        r"\bar p": Indexed(back.cov[:, 0]),
-        "I": np.eye(STATES),
-        "k": K_RANGE,
-    }
-    return system, y, laws, letters
-
-
-def _columns(means):
-    return Indexed([column(mean) for mean in means[:, 0]])
-
-
-def course(rng):
-    system, _, laws, letters = _record(rng)
-    p, Psi = laws.posterior.cov[:, 0], laws.predicted.cov[:, 0]
-    return letters | {
-        r"\lambda": _columns(laws.predicted.mean),
-        r"\Psi": Indexed(Psi),
-        "S": Indexed([np.linalg.solve(Psi[k + 1], system.A @ p[k]).T for k in range(STEPS - 1)]),
-        "A": Indexed([system.A] * STEPS, system.A),
-        r"\mathrm{Cov}(x_k,x_{k+1})": Of(lambda k: (system.A @ p[k]).T, "k"),
-        "Q": Indexed([system.Q] * STEPS),
-    }
-
-
-def meeting(rng):
-    """The information about x_k by one regression: of all that is measured from the first step on,
-    with its whole covariance."""
-    system, y, _, letters = _record(rng)
-    A, H, Q, R = system.A, system.H, system.Q, system.R
-
-    def of_later(first, k):
-        reach = np.arange(first - k, STEPS - k)
-        powers = [np.linalg.matrix_power(A, j) for j in range(STEPS)]
-
-        def rows(since):  # what the stacked measurements see of the state `since` steps after x_k
-            return np.vstack(
-                [
-                    np.empty((0, STATES)),
-                    *(H @ powers[j - since] if j >= since else 0 * H for j in reach),
-                ]
-            )
-
-        noise = np.kron(np.eye(len(reach)), R) + sum(
-            rows(i) @ Q @ rows(i).T for i in range(1, STEPS)
-        )
-        weighed = rows(0).T @ np.linalg.inv(noise)
-        return weighed @ rows(0), weighed @ column(y[first:])
-
-    later, own = ([of_later(k + shift, k) for k in range(STEPS)] for shift in (1, 0))
-    information = {
-        "J": Indexed([J for J, _ in later]),
-        r"\eta": Indexed([eta for _, eta in later]),
-        r"\tilde J": Indexed([J for J, _ in own]),
-        r"\tilde\eta": Indexed([eta for _, eta in own]),
-    }
-    return letters | information | {"A": A, "H": H, "Q": Q, "R": R, "y": _columns(y)}
+meeting = (
+    LATER
+    + r"""
+J_k = N_{4-k}
+\eta_k = h_{4-k}
+\tilde J_k = W_{4-k}
+\tilde\eta_k = w_{4-k}
+k: range 4
+b_0 = z_4
+v_0 = p_4
+G_k = p_{3-k}A^T\Psi_{4-k}^{-1}
+b_{k+1} = z_{3-k}+G_k(b_k-\lambda_{4-k})
+v_{k+1} = p_{3-k}+G_k(v_k-\Psi_{4-k})G_k^T
+k: range 5
+\bar z_k = b_{4-k}
+\bar p_k = v_{4-k}
+k: range 1 4
+keep: A, H, Q, R, I, k, y, z, p, \bar z, \bar p, J, \eta, \tilde J, \tilde\eta
+"""
+)
 
 
 walk = r"""
-Q, R: pos
+Q, R: in .5 2
 \Psi = Q
 again:
 \Psi = Q+1/(1/\Psi+1/R)
@@ -110,7 +80,7 @@ p = \Psi-Q
 
 
 one_component = r"""
-A, Q, s: pos
+A, Q, s: in .5 2
 k: range 1
 p_k = s
 \Psi_k = s
@@ -120,7 +90,7 @@ keep: A, Q, p, \Psi, k
 
 
 LETTERS = (course, meeting, walk, slow_walk, one_component)
-SAID = {
+DECLARED = {
     NOTATION: [
         r"\bar z=z",
         r"\bar p=p",

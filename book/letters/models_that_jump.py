@@ -43,7 +43,7 @@ forget: T, P, m, V
 
 failed = r"""
 \nu: num
-a, b: pos
+a, b: in .5 2
 j: range 2
 F_j = a+(b-a)j
 \ell = \ln\mathcal N(\nu;0,F_1)-\ln\mathcal N(\nu;0,F_0)
@@ -54,20 +54,20 @@ keep: F, \nu, \ell, \varrho
 
 joined = r"""
 x, y, g, \lambda: num
-\Psi, R: pos
+\Psi, R: in .5 2
 "2/p" = 2/\Psi+2g^2/R
 """
 
 
 turned = r"""
 V, v_x, v_y: num
-\omega, T: pos
+\omega, T: in .5 2
 \eta = \omega T/2
 """
 
 
 LETTERS = (correcting, predicting, failed, joined, turned)
-SAID = {
+DECLARED = {
     NOTATION: [
         r"\mathsf M\ell\big|_{\text{failed}}",
         r"\mathsf M\ell\big|_{\text{sound}}",

@@ -25,7 +25,7 @@ F = G\Psi G^T+R
 
 doubtful = r"""
 w = 0.3
-\Psi, R: pos
+\Psi, R: in .5 2
 \nu: num
 F = \Psi+R/w
 p = 1/(1/\Psi+w/R)
@@ -35,7 +35,7 @@ s = \nu/\sqrt F
 
 
 LETTERS = (doubting, doubtful)
-SAID = {
+DECLARED = {
     NOTATION: [
         "w=1",
         r"\mathsf P(\nu^TF^{-1}\nu<\gamma)",

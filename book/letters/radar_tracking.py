@@ -1,32 +1,7 @@
-"""The letters of radar-tracking.md: a limit by iteration, least squares, the package's
-alpha-beta filter and its filter with an acceleration made of measurements."""
+r"""The letters of radar-tracking.md: a limit by iteration, lines by least squares, and a filter with
+an acceleration made of measurements."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Indexed
-from gate.worlds import column, covariance
-
-from kfcourse import run
-from kfcourse.filters.alphabeta import alpha_beta, steady_beta, tracking_index
-from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem
-from kfcourse.linear import run as run_linear
-from kfcourse.linear.system import linear_system
-from kfcourse.scenarios.pointer import acceleration_from
-from kfcourse.scenarios.radar import kinematic
-
-ALPHA, SIGMA = 0.4, 3.0
-
-
-def axis(rng, alpha=ALPHA):
-    """One axis of the radar's model, with the noise that brings its gain to alpha."""
-    T = rng.uniform(0.5, 1)
-    sigma_a = tracking_index(alpha) * SIGMA / T**2
-    system = linear_system(kinematic(T, noise_sd=sigma_a, measurement_sd=SIGMA))[0]
-    A, Q, H = system.A[::3, ::3], system.Q[::3, ::3], system.H[:1, ::3]
-    B = Q[:, :1] / np.sqrt(Q[0, 0]) / sigma_a  # Q = sigma_a^2 B B^T
-    return {"T": T, "A": A, "B": B, "H": H, "Q": Q, r"\sigma_a": sigma_a, r"\sigma": SIGMA}
-
 
 model = r"""
 T: in .5 1
@@ -34,7 +9,7 @@ A = \begin{pmatrix}1&T\\0&1\end{pmatrix}
 B = \begin{pmatrix}T^2/2\\T\end{pmatrix}
 H = \begin{pmatrix}1&0\end{pmatrix}
 k: range 5
-v, w: nums 6
+v, w: list 6 num
 b: any 2
 x_0 = b
 x_{k+1} = Ax_k+Bv_k
@@ -82,90 +57,100 @@ e = Ce+(I-KH)Ba_0
 then:
 \nu = H(Ae+Ba_0)
 \ell = He
-forget: e, s, C, I
-entries: \Psi, p
+O = \begin{pmatrix}0&1\end{pmatrix}
+\Psi_{11} = H\Psi H^T
+\Psi_{12} = H\Psi O^T
+\Psi_{22} = O\Psi O^T
+p_{11} = HpH^T
+p_{12} = HpO^T
+p_{22} = OpO^T
+forget: e, s, C, I, O
 """
 
 
-def growing(rng):
-    """The weight of the newest point in the line through k points, at its end and in its slope."""
-    end, slope = ([0.0] * 7 for _ in range(2))
-    for k in range(2, 7):
-        weights = np.linalg.pinv(np.column_stack([np.ones(k), np.arange(1 - k, 1)]))
-        end[k], slope[k] = weights[:, -1]
-    return {r"\alpha": Indexed(end), r"\beta": Indexed(slope), "k": range(2, 7)}
+growing = r"""
+k: range 2 7
+M_k = \sum_{i=0}^{k-1}\begin{pmatrix}1&-i\\-i&i^2\end{pmatrix}
+"\alpha_k" of k = \begin{pmatrix}1&0\end{pmatrix}M_k^{-1}\begin{pmatrix}1\\0\end{pmatrix}
+"\beta_k" of k = \begin{pmatrix}0&1\end{pmatrix}M_k^{-1}\begin{pmatrix}1\\0\end{pmatrix}
+forget: M
+"""
 
 
-def _followed(rng):
-    known = axis(rng)
-    of_axis = kinematic(known["T"], noise_sd=known[r"\sigma_a"], measurement_sd=SIGMA)
-    y = rng.normal(size=(6, 1, 3))
-    return known, y[:, 0, 0], run(alpha_beta(of_axis, ALPHA, steady_beta(ALPHA)), y).mean[:, 0, ::3]
+start = r"""
+T: in .5 1
+y: list 2 num
+x = \begin{pmatrix}1&-T\\1&0\end{pmatrix}^{-1}\begin{pmatrix}y_0\\y_1\end{pmatrix}
+r = \begin{pmatrix}1&0\end{pmatrix}x
+s = \begin{pmatrix}0&1\end{pmatrix}x
+forget: x
+"""
 
 
-def start(rng):
-    known, y, states = _followed(rng)
-    return {"T": known["T"], "y": Indexed(y), "r": states[1, 0], "s": states[1, 1]}
+step = r"""
+T: in .5 1
+b: any 3
+y: num
+X = \begin{pmatrix}1&-2T\\1&-T\\1&0\end{pmatrix}     # the memory still grows: lines through all points
+W = (X^TX)^{-1}X^T
+r = \begin{pmatrix}1&0\end{pmatrix}Wb
+s = \begin{pmatrix}0&1\end{pmatrix}Wb
+r^- = \begin{pmatrix}1&T\end{pmatrix}Wb
+\nu = y-r^-
+Y = \begin{pmatrix}1&-3T\\1&-2T\\1&-T\\1&0\end{pmatrix}
+V = (Y^TY)^{-1}Y^T
+c = \begin{pmatrix}b\\y\end{pmatrix}
+n = \begin{pmatrix}0\\0\\0\\1\end{pmatrix}
+r\leftarrow = \begin{pmatrix}1&0\end{pmatrix}Vc
+s\leftarrow = \begin{pmatrix}0&1\end{pmatrix}Vc
+"\alpha_k" = \begin{pmatrix}1&0\end{pmatrix}Vn
+"\beta_k" = \begin{pmatrix}0&T\end{pmatrix}Vn
+\alpha = 0.4
+\beta = 2(1-\sqrt{1-\alpha})^2
+forget: X, W, Y, V, b, c, n
+"""
 
 
-def step(rng):
-    """The fourth measurement: the memory still grows."""
-    known, y, states = _followed(rng)
-    gains = growing(rng)
-    return {
-        "T": known["T"],
-        "r": states[2, 0],
-        "s": states[2, 1],
-        "r^-": (known["A"] @ states[2])[0],
-        "y": y[3],
-        r"\nu": y[3] - (known["A"] @ states[2])[0],
-        r"\alpha": ALPHA,
-        r"\beta": steady_beta(ALPHA),
-        r"\alpha_k": gains[r"\alpha"][4,],
-        r"\beta_k": gains[r"\beta"][4,],
-        r"r\leftarrow": states[3, 0],
-        r"s\leftarrow": states[3, 1],
-    }
+controlled = r"""
+T: in .5 1
+\sigma: in 2 3
+\sigma_a: in 1 2
+A = \begin{pmatrix}1&T\\0&1\end{pmatrix}
+B = \begin{pmatrix}T^2/2\\T\end{pmatrix}
+H = \begin{pmatrix}1&0\end{pmatrix}
+P: cov 2
+l: any 2
+y: list 7 num
+k: range 1 7
+d_k = (y_k-y_{k-1})/T
+k: range 2 6
+u_k = (d_k-d_{k-1})/T
+\lambda_2 = l
+\Psi_2 = P
+p_k = (\Psi_k^{-1}+H^TH/\sigma^2)^{-1}
+z_k = p_k(\Psi_k^{-1}\lambda_k+H^Ty_k/\sigma^2)
+\lambda_{k+1} = Az_k+Bu_k
+\Psi_{k+1} = Ap_kA^T+\sigma_a^2BB^T
+k: range 2 5
+keep: T, A, B, H, \sigma, \sigma_a, \lambda, z, u, y, k
+"""
 
 
-def controlled(rng):
-    """A run with the control."""
-    known = axis(rng)
-    y = rng.normal(size=(6, 1, 2))
-    u = np.nan_to_num(acceleration_from(y, known["T"]))[..., :1]
-    Q = (known["Q"] + known["Q"].T) / 2
-    system = LinearSystem(known["A"], known["H"], Q, np.array([[SIGMA**2]]), known["B"])
-    law = run_linear(system, Gaussian(rng.normal(size=2), covariance(rng, 2)), y[..., :1], u)
-    z, lam = ([column(mean) for mean in laws.mean[:, 0]] for laws in (law.posterior, law.predicted))
-    return known | {
-        r"\lambda": Indexed(lam),
-        "z": Indexed(z),
-        "u": Indexed(u[:, 0, 0]),
-        "y": Indexed(y[:, 0, 0]),
-        "k": range(2, 5),
-    }
-
-
-def polar(rng):
-    """The meter's derivatives by differences."""
-    x = rng.uniform(1, 2, 2)
-
-    def h(x):
-        return np.array([abs(complex(*x)), np.angle(complex(*x))])
-
-    steps = 1e-6 * np.eye(2)
-    H = np.column_stack([(h(x + step) - h(x - step)) / 2e-6 for step in steps])
-    return {
-        "r_x": x[0],
-        "r_y": x[1],
-        "d": h(x)[0],
-        r"\varphi": h(x)[1],
-        "h": lambda _: column(h(x)),
-        "x": 0,
-        r"\operatorname{atan2}": lambda y, x: np.arctan2(y, x),
-        "H": H,
-        r"\frac{\partial h}{\partial(r_x,r_y)}": H,
-    }
+polar = r"""
+d: in .5 2
+\varphi: in .2 1
+b = \begin{pmatrix}1&0\end{pmatrix}
+c = \begin{pmatrix}0&1\end{pmatrix}
+g(q) = bq\begin{pmatrix}\cos(cq)\\\sin(cq)\end{pmatrix}
+q = \begin{pmatrix}d\\\varphi\end{pmatrix}
+"h(x)" = q
+H = \operatorname{slope}(g, q)^{-1}
+r_x = bg(q)
+r_y = cg(q)
+"\operatorname{atan2}(r_y,r_x)" = \varphi
+"\frac{\partial h}{\partial(r_x,r_y)}" = H
+forget: b, c, g, q
+"""
 
 
 LETTERS = (
@@ -177,7 +162,7 @@ LETTERS = (
     controlled,
     polar,
 )
-SAID = {
+DECLARED = {
     DEFINITION: [r"v_k\sim\mathcal N(0,\sigma_a^2)", r"w_k\sim\mathcal N(0,\sigma^2)"],
     "quoted from the radar paper": [r"K=[\alpha,\beta/T]^T"],
     NOTATION: [r"E(\zeta)"],

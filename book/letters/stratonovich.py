@@ -1,10 +1,7 @@
-"""The letters of stratonovich.md: a linear model whose densities are all known, and a chain as a
-plain program."""
+r"""The letters of stratonovich.md: a linear model whose densities are all known, and a chain."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Of, Operator, bell
-from gate.worlds import chain_run
+from gate.shared import CHAIN
 
 densities = r"""
 a = 0.8
@@ -35,60 +32,58 @@ forget: a, Q, H, R, p, z, y, m, \Psi, F, K, G
 """
 
 
-def joint(rng):
-    """The density of three states and measurements, from the covariance of all six."""
-    a, Q, H, R = 0.8, 0.5, 1.3, 0.4
-    xi = np.diag([1.0, Q, Q, R, R, R])
-    states = np.array([[1, 0, 0], [a, 1, 0], [a**2, a, 1]])
-    made = np.block([[states, np.zeros((3, 3))], [H * states, np.eye(3)]])
-    x, y = rng.normal(size=(2, 3))
-    whole = bell(np.concatenate([x, y])[:, None], np.zeros((6, 1)), made @ xi @ made.T)
-    return {
-        "k": 2,
-        "p(x_{0:k},y_{0:k})": whole,
-        "p(x_0)": bell(x[0], 0, 1.0),
-        r"p(y_0\mid x_0)": bell(y[0], H * x[0], R),
-        r"p(x_i\mid x_{i-1})": Of(lambda i: bell(x[i], a * x[i - 1], Q), "i"),
-        r"p(y_i\mid x_i)": Of(lambda i: bell(y[i], H * x[i], R), "i"),
-    }
+joint = r"""
+a = 0.8
+Q = 0.5
+H = 1.3
+R = 0.4
+I: eye 3
+x, y: list 3 num
+A = \begin{pmatrix}1&0&0\\a&1&0\\a^2&a&1\end{pmatrix}
+P = A\begin{pmatrix}1&0&0\\0&Q&0\\0&0&Q\end{pmatrix}A^T
+V = \begin{pmatrix}P&HP\\HP&H^2P+RI\end{pmatrix}         # of all six
+u = \begin{pmatrix}x_0\\x_1\\x_2\\y_0\\y_1\\y_2\end{pmatrix}
+i: range 1 3
+k = 2
+"p(x_{0:k},y_{0:k})" = \mathcal N(u;0u,V)
+"p(x_0)" = \mathcal N(x_0;0,1)
+"p(y_0\mid x_0)" = \mathcal N(y_0;Hx_0,R)
+"p(x_i\mid x_{i-1})" of i = \mathcal N(x_i;ax_{i-1},Q)
+"p(y_i\mid x_i)" of i = \mathcal N(y_i;Hx_i,R)
+forget: a, Q, H, R, I, x, y, A, P, V, u
+"""
 
 
-def chain(rng):
-    nodes = np.array([0.0, 1.0, 3.0])
-    P = rng.dirichlet(np.ones(3), size=3)
+chain = r"""
+x: list 3 num
+i: range 3
+j: range 3
+P: share 3 3
+m = \begin{pmatrix}0.2&0.3&0.5\end{pmatrix}
+l(y, x) = \mathcal N(y;x,0.7)
+"""
+chain += (
+    CHAIN
+    + r"""
+"p(y_k\mid j)" of k, j = l(y_k,x_j)
+"p(y_k\mid x_j)" of k, j = l(y_k,x_j)
+forget: l
+"""
+)
 
-    def seen(y, x):
-        return bell(y, x, 0.7)
 
-    run = chain_run(rng, nodes, P, rng.dirichlet(np.ones(3)), seen)
-    y, at = run["y"].values, run["x"].values
-    return run | {
-        r"p(y_k\mid j)": Of(lambda k, j: seen(y[k], at[j]), "k", "j"),
-        r"p(y_k\mid x_j)": Of(lambda k, j: seen(y[k], at[j]), "k", "j"),
-    }
-
-
-def splitting(rng):
-    """What a meter with three readings tells of a state with four values."""
-    joint, x = rng.dirichlet(np.ones(12)).reshape(3, 4), rng.normal(size=4)
-    given = joint / joint.sum(axis=1, keepdims=True)
-    z, square = given @ x, given @ x**2
-    mass, lam = joint.sum(axis=1), joint.sum(axis=0) @ x
-
-    def mean(values):
-        return float(mass @ values)
-
-    before = joint.sum(axis=0) @ (x - lam) ** 2
-    means = {
-        r"\mathsf M": Operator(mean),
-        r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2)),
-    }
-    return means | {
-        "p": Indexed([square - z**2]),
-        "z": Indexed([z], z),
-        r"\Psi": Indexed([before]),
-        "k": range(1),
-    }
+splitting = r"""
+u, v: nodes 0 1              # of the measurement, and of the error after it
+r = u+0.3u^2
+q = 1+u^2/4
+x = r+\sqrt qv
+k: range 1
+"p_k" of k = q
+"z_k" of k = r
+"\Psi_k" of k = \mathsf Dx
+z = r
+forget: u, v, r, q, x
+"""
 
 
 shadow = r"""
@@ -99,7 +94,7 @@ q: in .2 .8
 
 product = r"""
 y, H, x, \lambda: num
-R, \Psi: pos
+R, \Psi: in .5 2
 F = H^2\Psi+R
 p = 1/(1/\Psi+H^2/R)
 K = pH/R
@@ -108,12 +103,12 @@ e = x-\lambda
 """
 marginal = r"""
 x_k, z_{k-1}, A: num
-p_{k-1}, Q: pos
+p_{k-1}, Q: in .5 2
 """
 
 
 LETTERS = (densities, joint, chain, product, marginal, splitting, shadow)
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
         "y_k=S_k(x_k)+n_k",

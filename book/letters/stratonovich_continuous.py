@@ -9,7 +9,7 @@ D = 1
 
 
 LETTERS = (at_rest,)
-SAID = {
+DECLARED = {
     DEFINITION: [r"dx=a(x)\,dt+B(x)\,dw", r"dY=c(x)\,dt+\sqrt R\,d\beta"],
     STATED: [
         r"dq=L^*q\,dt+\frac{c\,q}{R}\,dY",

@@ -52,6 +52,6 @@ def _letters(x, x_next, y, v, w):
 
 
 LETTERS = (first, variant)
-SAID = {
+DECLARED = {
     DEFINITION: [r"x_0\sim\mathcal N(0,1)"],
 }

@@ -1,35 +1,36 @@
-"""The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
+r"""The letters of time-tags.md: a foreign clock, and the prediction over an interval in one step and
+in many short ones."""
 
 from gate.page import DEFINITION, NOTATION
-from gate.worlds import column, covariance
+from gate.shared import LINEAR
 
-from kfcourse.scenarios.navigation import Clock, Dynamics
+clock = r"""
+r: in .9 1.1
+c_0, t: num
+c = c_0+rt
+"""
 
-
-def clock(rng):
-    rate, shift, read = rng.uniform(0.9, 1.1), *rng.normal(size=2)
-    return {"c": read, "c_0": shift, "r": rate, "t": Clock(rate, shift).time(read)}
-
-
-def prediction(rng):
-    """Over the interval in one step, against many short ones."""
-    motion = Dynamics(A=rng.normal(size=(3, 3)), B=rng.normal(size=(3, 1)), Qc=covariance(rng, 3))
-    z, p, u, delta = column(rng.normal(size=3)), covariance(rng, 3), rng.normal(size=(1, 1)), 0.4
-    lam, Psi, short = z, p, motion.over(delta / 8)
-    for _ in range(8):
-        lam, Psi = short.A @ lam + short.B @ u, short.A @ Psi @ short.A.T + short.Q
-    return {
-        "A": lambda d: motion.over(d).A,
-        "B": lambda d: motion.over(d).B,
-        "Q": lambda d: motion.over(d).Q,
-        r"\Delta": delta,
-        "z": z,
-        "p": p,
-        "u": u,
-        r"\lambda": lam,
-        r"\Psi": Psi,
-    }
-
+prediction = (
+    LINEAR
+    + r"""
+z: any 2
+p: cov 2
+q: num
+\Delta = 0.4
+d = \Delta/8
+k: range 9
+x_0 = z
+P_0 = p
+x_{k+1} = \Phi(d)x_k+b(d)q
+P_{k+1} = \Phi(d)P_k\Phi(d)^T+Q(d)
+\lambda = x_8
+\Psi = P_8
+A(t) = \Phi(t)
+B(t) = b(t)
+u = q
+keep: A, B, Q, \Delta, z, p, u, \lambda, \Psi
+"""
+)
 
 late = r"""
 s, V, a, j, \tau, b: num
@@ -44,19 +45,19 @@ keep: s, V, b, V_0, a_0, j, \tau, \hat s, \hat V, \hat b
 
 
 one_step_late = r"""
-p, Q, R, K: pos
+p, Q, R, K: in .5 2
 K_* = p/(p+R)
 """
 
 
 late_gain = r"""
-p, Q, R: pos
+p, Q, R: in .5 2
 K = 1-R/(p+Q+R)
 """
 
 
 LETTERS = (clock, prediction, late, one_step_late, late_gain)
-SAID = {
+DECLARED = {
     NOTATION: [r"\text{loss}", r"\text{has}-\text{claims}"],
     DEFINITION: [
         r"\hat s(t)=s(t-\tau)",

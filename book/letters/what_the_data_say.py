@@ -1,57 +1,39 @@
-"""The letters of what-the-data-say.md: a level that wanders, its record's density at once, and one
+r"""The letters of what-the-data-say.md: a level that wanders, its record's density at once, and one
 round of EM by a dense law."""
 
-import numpy as np
 from gate.page import NOTATION, STATED
-from gate.values import Indexed
-from scipy.stats import multivariate_normal
 
-from kfcourse.filters import kalman_filter
-from kfcourse.linear.consistency import innovations
-from kfcourse.montecarlo.experiment import predictions, run
-from kfcourse.records import smooth
-from kfcourse.symbolic.model import Model
-
+wandering = r"""
+c, r, d: in .5 2
 N = 4
-
-
-def wandering(rng):
-    """The record's law is one normal law; the innovations are the package's."""
-    q, r, d = rng.uniform(0.5, 2, 3)
-    model = Model.define(
-        "x + v",
-        "x + w",
-        prior={"mean": 0, "variance": d},
-        state_noise={"variance": q},
-        meter_noise={"variance": r},
-    )
-    filter_, y = kalman_filter(model), rng.normal(size=N + 1)
-    at = np.arange(N + 1)
-    states = d + q * np.minimum(at[:, None], at)
-    law = states + r * np.eye(N + 1)
-    nu, F = innovations(filter_.structure.measure, predictions(filter_, y), y[:, None, None])
-    log_density = multivariate_normal(np.zeros(N + 1), law).logpdf(y)
-    gain = states @ np.linalg.inv(law)
-    z, p = gain @ y, states - gain @ states
-    back, own = smooth(filter_, y), run(filter_, y).cov.ravel()
-    expected = np.mean(np.diff(z) ** 2 + np.diag(p)[1:] + np.diag(p)[:-1] - 2 * np.diag(p, 1))
-    letters = {
-        r"\ln L": log_density,
-        r"\nu": Indexed(nu.ravel()),
-        "F": Indexed(F.ravel()),
-        "q": expected,
-        "N": N,
-    }
-    return letters | {
-        r"\bar z": Indexed(back.mean.ravel()),
-        r"\bar p": Indexed(back.cov.ravel()),
-        "S": Indexed(own / (own + q)),
-        "k": range(N + 1),
-    }
+I: eye 5
+u: any 5
+A = \begin{pmatrix}0&0&0&0&0\\0&1&1&1&1\\0&1&2&2&2\\0&1&2&3&3\\0&1&2&3&4\end{pmatrix}
+o = \begin{pmatrix}1\\1\\1\\1\\1\end{pmatrix}
+P = doo^T+cA                    # of the five states
+V = P+rI
+\ln L = \ln\mathcal N(u;0u,V)
+Z = u^TV^{-1}P
+C = P-PV^{-1}P
+k: range 5
+y_k = (u^T)_{k+1}
+\lambda_0 = 0
+\Psi_0 = d
+F_k = \Psi_k+r
+\nu_k = y_k-\lambda_k
+p_k = 1/(1/\Psi_k+1/r)
+\lambda_{k+1} = \lambda_k+\nu_k\Psi_k/F_k
+\Psi_{k+1} = p_k+c
+S_k = p_k/(p_k+c)
+\bar z_k = (Z)_{k+1}
+\bar p_k = ((C)_{k+1}^T)_{k+1}
+q = \sum_{k=0}^3((\bar z_{k+1}-\bar z_k)^2+\bar p_{k+1}+\bar p_k-2((C)_{k+1}^T)_{k+2})/N
+keep: \ln L, \nu, F, q, N, \bar z, \bar p, S, k
+"""
 
 
 whittle = r"""
-q, r: pos
+q, r: in .5 2
 N = 7
 \omega: in 1 2
 w(x) = 2(1-\cos(x))
@@ -67,40 +49,25 @@ forget: w
 """
 
 
-def rounds(rng, r_of_m=0.5):
-    """Rounds of EM for independent states, each the mean of their squares over a record whose mean
-    square is m."""
-    y = rng.normal(size=5)
-    m = float(np.mean(y**2))
-    r = r_of_m * m
-
-    def after(q):
-        gain = q / (q + r)
-        return float(np.mean((gain * y) ** 2 + (1 - gain) * q))
-
-    q = [m]
-    for _ in range(20_001):
-        q.append(after(q[-1]))
-    return {
-        "m": m,
-        "r": r,
-        "K": q[-1] / (q[-1] + r),
-        "q": Indexed(q, q[-1]),
-        "q'": after(q[-1]),
-        "j": range(20_000, 20_001),
-    }
-
-
-def quiet_rounds(rng):
-    return rounds(rng, 2)
-
-
-def edge_rounds(rng):
-    return rounds(rng, 1)
+rounds = r"""
+y: sample 5
+m = \mathsf My^2
+r = sm
+n = 300
+k: range 300
+q_0 = m
+K_k = q_k/(q_k+r)
+q_{k+1} = \mathsf M(K_ky)^2+(1-K_k)q_k
+q = q_n
+K = q/(q+r)
+q' = \mathsf M(Ky)^2+(1-K)q
+j: range 300 301
+keep: m, r, K, q, q', j
+"""
 
 
 seen_states = r"""
-q, r: pos
+q, r: in .5 2
 N = 9
 x: nodes 0 q
 I_\text{states} = N\mathsf M(x^2/q^2-1/q)^2/4
@@ -111,8 +78,15 @@ keep: q, r, N, I_\text{states}, I_\text{record}
 """
 
 
-LETTERS = (wandering, whittle, rounds, quiet_rounds, edge_rounds, seen_states)
-SAID = {
+LETTERS = (
+    wandering,
+    whittle,
+    "s = 0.5\n" + rounds,
+    "s = 2\n" + rounds,
+    "s = 1\n" + rounds,
+    seen_states,
+)
+DECLARED = {
     STATED: [r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})"],
     NOTATION: [r"\ln p(y_0)+\ln p(y_1\mid y_0)", r"\ln p(y_0,y_1)", r"\mathsf M r_k^2"],
 }

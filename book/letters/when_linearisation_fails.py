@@ -2,7 +2,6 @@
 quadrature."""
 
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.worlds import world
 
 display = r"""
 \lambda: num
@@ -31,21 +30,31 @@ keep: S', S'', S, h, F, G, \Psi, D_n, s, c, \nu, \kappa, t, S(x), S(\lambda)
 """
 
 
-def western(rng):
-    own = world(display)(rng)
-    names = {r"\Psi": "P^-", "D_n": "R", "S'": "h'", "S''": "h''"}
-    return {names.get(name, name): value for name, value in own.items()}
+western = (
+    display
+    + r"""
+P^- = \Psi
+R = D_n
+h' = S'
+h'' = S''
+forget: \Psi, D_n, S', S''
+"""
+)
 
 
-def again(rng):
-    """A constant measured n times, the first time with a larger error than is claimed: the filter's
-    own recursion."""
-    kappa, p, n = rng.uniform(1, 3), rng.uniform(0.5, 2), int(rng.integers(4, 9))
-    claimed, square = p, (1 + 3 * kappa**2 / 4) * p
-    for _ in range(n - 1):
-        K = claimed / (claimed + p)
-        claimed, square = (1 - K) * claimed, (1 - K) ** 2 * square + K**2 * p
-    return {r"\kappa": kappa, "n": n, r"\frac{\mathsf Me_n^2}{p_n}": square / claimed}
+again = r"""
+\kappa: in 1 3
+p: in .5 2
+n = 5                # a constant is measured so often; the first error is larger than is claimed
+k: range 1 6
+P_1 = p
+M_1 = (1+3\kappa^2/4)p
+K_k = P_k/(P_k+p)
+P_{k+1} = 1/(1/P_k+1/p)
+M_{k+1} = (1-K_k)^2M_k+K_k^2p
+"\frac{\mathsf Me_n^2}{p_n}" = M_n/P_n
+keep: \kappa, n, \frac{\mathsf Me_n^2}{p_n}
+"""
 
 
 line = r"""
@@ -79,7 +88,7 @@ S'(x) = \cos x
 
 
 LETTERS = (display, western, again, line, statistical)
-SAID = {
+DECLARED = {
     DEFINITION: [
         r"x_{k+1}=x_k-T\sin x_k+\cos(x_k)\,\xi_k",
         r"y_k=\sin x_k+n_k",

@@ -23,7 +23,7 @@ keep: a, Q, R, \zeta, S_x(\zeta), S_y(\zeta), K, \gamma, \rho, \Psi, z, y_k, z\l
 
 
 amplitude = r"""
-s, y: nums 4
+s, y: list 4 num
 R = 0.7
 d = 1.9
 b = 0.6
@@ -39,8 +39,8 @@ keep: C, E, R, d, z, p, b, \mathcal L, i, s, y
 
 correlator = r"""
 n = 3
-s: nums 4
-y: nums 9
+s: list 4 num
+y: list 9 num
 i: range 4
 k: range 3 9
 C_k = \sum_is_iy_{k-3+i}
@@ -49,7 +49,7 @@ C_k = \sum_is_iy_{k-3+i}
 
 
 weights = r"""
-g, s: nums 4
+g, s: list 4 num
 k: range 4
 c = \sum_{k=0}^3g_ks_k/\sum_{k=0}^3s_k^2
 k: range 4
@@ -57,7 +57,7 @@ k: range 4
 
 
 one_sample = r"""
-p, R: pos
+p, R: in .5 2
 z, s, y: num
 K = ps/(s^2p+R)
 z' = z+K(y-sz)
@@ -66,7 +66,7 @@ p' = p-Kps
 
 
 LETTERS = (signal, amplitude, correlator, weights, one_sample)
-SAID = {
+DECLARED = {
     DEFINITION: [r"\zeta=e^{i\theta}", "x_{k+1}=ax_k+v_k", "y_k=x_k+w_k", r"y_k=b\,s_k+w_k"],
     "quoted from Van Trees": [
         r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+"

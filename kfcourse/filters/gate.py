@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.filters.base import Filter, State, structure_of
 from kfcourse.laws import (
     Array,
@@ -109,9 +109,9 @@ def gated(
     >>> import numpy as np
     >>> from kfcourse import Model, run
     >>> from kfcourse.filters import gated, kalman_filter
-    >>> one = kalman_filter(Model.define("x + 0.1*v", "x + w"))
+    >>> plain = kalman_filter(Model.define("x + 0.1*v", "x + w"))
     >>> y = np.array([0.1, 0.0, 90.0])
-    >>> [round(run(each, y).mean[-1].item(), 3) for each in (one, gated(one))]
+    >>> [round(run(each, y).mean[-1].item(), 3) for each in (plain, gated(plain))]
     [23.247, 0.033]
     """
     expect(filter_, Filter, "gated")
@@ -119,13 +119,8 @@ def gated(
         expect(structure, Structure, "structure=")
     if not 0 < probability < 1:
         raise ValueError(f"probability must lie between 0 and 1, got {probability!r}")
-    if patience is not None and (
-        isinstance(patience, bool) or not isinstance(patience, int | np.integer) or patience < 1
-    ):
-        raise ValueError(
-            f"patience must be a whole number of refusals, at least 1, or None for no end of it; "
-            f"got {patience!r}"
-        )
+    if patience is not None:
+        expect_sizes(patience=patience)
     expecting = structure or structure_of(filter_, "a gate")
     # For 0, ..., p components measured; with none there is nothing to refuse.
     limits = np.array(

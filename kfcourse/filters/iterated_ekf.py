@@ -18,10 +18,8 @@ is the iterated posterior linearisation filter (Garcia-Fernandez, Svensson, More
 
 from __future__ import annotations
 
-import numpy as np
-
 from kfcourse.angles import Components, difference
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import (
@@ -94,19 +92,11 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
     >>> from kfcourse.filters import iterated
     >>> model = Model.define("x + v", "x**3 + 0.1*w", {}, prior=dict(mean=1, variance=1))
     >>> filters = [iterated(linearised(model), count) for count in (1, 2, 20)]
-    >>> [round(run(one, np.array([[[8.0]]])).mean.item(), 3) for one in filters]
+    >>> [round(run(each, np.array([[[8.0]]])).mean.item(), 3) for each in filters]
     [3.331, 2.461, 2.0]
     """
     expect(structure, Structure, "iterated")
-    if (
-        isinstance(iterations, bool)
-        or not isinstance(iterations, int | np.integer)
-        or iterations < 1
-    ):
-        raise ValueError(
-            f"iterations must be a whole number, at least 1 (which is aof(structure)); got "
-            f"{iterations!r}"
-        )
+    expect_sizes(iterations=iterations)
 
     def step(state: State, y: Array) -> State:
         prior, now = state.predicted, structure.at(state.step)

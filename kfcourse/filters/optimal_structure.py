@@ -47,7 +47,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, near
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import State
 from kfcourse.filters.designed import (
@@ -276,10 +276,7 @@ def _of_measurements(family: str, structure: Structure, recipe: Recipe, memory: 
 
 def checked_memory(memory: int) -> int:
     """The length of a memory; ValueError if it is not a positive whole number."""
-    if isinstance(memory, bool) or not isinstance(memory, int | np.integer) or memory < 1:
-        raise ValueError(
-            f"a memory holds so many steps, a positive whole number such as 4, got {memory!r}"
-        )
+    expect_sizes(memory=memory)
     return memory
 
 

@@ -41,7 +41,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import (
     Array,
@@ -102,8 +102,7 @@ def robust(
         raise ValueError(f"degrees must be positive, got {degrees!r}")
     if edge is not None and not edge > 0:
         raise ValueError(f"edge must be positive, or None for Student's weights; got {edge!r}")
-    if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 1:
-        raise ValueError(f"rounds must be a whole number, at least 1; got {rounds!r}")
+    expect_sizes(rounds=rounds)
 
     def init(runs: int) -> State:
         return initial_state(structure.model)(runs)._replace(memory=Trust(np.full(runs, np.nan)))

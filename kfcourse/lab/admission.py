@@ -22,7 +22,6 @@ from kfcourse.lab.short_names import (
     FILTERS,
     JUMP_FILTERS,
     Entry,
-    JumpStructures,
     Structures,
     check_names,
     has_exact,
@@ -94,7 +93,7 @@ def admissions(
     entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
     names = list(dict.fromkeys(entries if names is None else names))
     check_names(names, entries)
-    structures = JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)
+    structures = Structures.of(model)
     answers, late = [], set()
     for name in names:
         functions = entries[name].functions

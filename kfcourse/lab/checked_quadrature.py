@@ -70,13 +70,7 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
     formulas = [(mode, _formulas(mode)) for mode in modes_of(model)]
     size = max(axes(mode) for mode, structure in formulas if structure is None)
     problem = ""
-    for order in ORDERS:
-        if (points := order**size) > MOST:
-            problem += (
-                f"; {order} points on each of {size} axes are {points}, more than the "
-                f"{MOST} with which a comparison ends"
-            )
-            break
+    for order in (order for order in ORDERS if order**size <= MOST):
         try:
             tried = [(known, 0.0) if known else _tried(mode, order) for mode, known in formulas]
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
@@ -88,7 +82,7 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         problem = (
             f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on "
-            f"the laws that occur"
+            f"the laws that occur, and more than {MOST} points in all are too many"
         )
     raise NoClosedForm(f"{why}{problem}", why.kind, **why.parts)
 

@@ -19,6 +19,7 @@ class Family(NamedTuple):
     heading, russian_heading  of the section with its equations in reports; "" if `EQUATIONS` has
                               none of it
     colour, marker            Matplotlib's
+    memory                    whether its filters remember several steps
     """
 
     title: str
@@ -27,6 +28,7 @@ class Family(NamedTuple):
     russian_heading: str = ""
     colour: str = "#555555"
     marker: str = "."
+    memory: bool = False
 
 
 FAMILIES: dict[str, Family] = {
@@ -37,6 +39,8 @@ FAMILIES: dict[str, Family] = {
 }
 
 
-def look(family: str) -> tuple[str, str]:
-    """Colour and marker of a family."""
-    return FAMILIES.get(family, Family(family, family))[4:]
+def look(name: str) -> tuple[str, str]:
+    """Colour and marker of a family, or of a filter by its short name: FAMILY[NUMBER]-FUNCTIONS."""
+    kind = name.partition("-")[0]
+    keys = (name, kind, kind.rstrip("0123456789"))
+    return next((FAMILIES[key] for key in keys if key in FAMILIES), Family(name, name))[4:6]

@@ -40,7 +40,7 @@ def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour and marker by family, dashes by structural functions, black
     for the exact."""
     known = entry(name)
-    colour, marker = ("black", "*") if known.functions == "exact" else look(known.drawn)
+    colour, marker = ("black", "*") if known.functions == "exact" else look(name)
     return {
         "color": colour,
         "linestyle": DASHES.get(known.functions, "-"),
@@ -146,3 +146,12 @@ def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> A
             )
     ax.set_ylim(-0.02, 1.02)
     return _labelled(ax, words.mode, words)
+
+
+# Of a comparison, by name.
+FIGURES: dict[str, Callable[..., Axes]] = {
+    "accuracy": accuracy,
+    "relative": relative_accuracy,
+    "ranking": ranking,
+    "consistency": consistency,
+}

@@ -17,22 +17,17 @@ A variant is well posed if it is
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any, NamedTuple
 
 import joblib
 import numpy as np
-import scipy
-import sympy as sp
 from tqdm import tqdm
 
 from kfcourse.errors import NoClosedForm, NotFinite
-from kfcourse.filters import Design, Filter
-from kfcourse.filters.base import State, initial_state
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import LAB, Structures, title
+from kfcourse.lab.short_names import LAB, Structures, operations, title
 from kfcourse.lab.variants import RUNS, Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
@@ -41,7 +36,7 @@ from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.statistics import Estimate, ratio
+from kfcourse.montecarlo.statistics import Estimate, means_without_each, ratio
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -53,10 +48,8 @@ CARRIERS = 10.0  # trajectories, at least, that carry a second moment
 DIVERGED = 10.0  # a filter's error variance over that without measurements
 # the best filter's error variance over that without measurements, when the meter tells too little
 UNSEEN = 0.9
-SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
-ROUNDING = 1e-9  # relative differences that rounding alone explains
+SIGNIFICANCE = 0.01  # of "the filters differ", for all filters and steps together
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
-UNMEASURED = "without measurements"
 CRITERIA = ("bounded", "observable", "filters differ", "solvable")
 
 
@@ -160,15 +153,13 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     if not moments.ok or not filters:
         return {"bounded": moments}
     try:
-        entrants = [*filters, unmeasured(model, x)]
-        result = compare(entrants, model, runs, steps, seed, jobs=1, progress=False)
+        result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
-    designed = [built.name for built in filters if isinstance(built, Design)]
     return {
-        "bounded": not_diverging(result) or moments,
+        "bounded": not_diverging(result, x) or moments,
         "observable": observable(result, x),
-        "filters differ": differences(result, designed),
+        "filters differ": differences(result),
     }
 
 
@@ -255,112 +246,75 @@ def varies(x: Array) -> Array:
     return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
 
 
-def unmeasured(model: Model, x: Array) -> Filter:
-    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs,
-    n)."""
-    means = x.mean(axis=1)
-    u = x - means[:, None]
-    covs = np.einsum("kri,krj->kij", u, u) / x.shape[1]
-
-    def step(state: State, y: Array) -> State:
-        law = Gaussian(np.tile(means[state.step], (len(y), 1)), covs[state.step])
-        return State(state.step + 1, law, law)
-
-    return Filter(UNMEASURED, model, initial_state(model), step)
+def shares(result: Comparison, x: Array) -> Estimate:
+    """Error variances of the filters over those of trajectories x (steps, runs, n), which no
+    measurement makes smaller: means over the steps at which a component varies, (filters, n)."""
+    used, u = varies(x), x - x.mean(axis=1, keepdims=True)
+    base = np.moveaxis(means_without_each(np.moveaxis(u**2, 1, 0)), 0, -1)
+    count = np.maximum(used.sum(axis=0), 1)[:, None]
+    weight = ratio(used[..., None], base * count, 0.0)
+    return Estimate.jackknife((result.sums.means("square") * weight).sum(axis=1))
 
 
-def measured(comparison: Comparison) -> list[str]:
-    """Names of the filters that use the measurements."""
-    return [name for name in comparison.names if name != UNMEASURED]
-
-
-def shares(comparison: Comparison, name: str) -> Estimate:
-    """Error variance of a filter over that without measurements, mean over the steps, for each
-    component: (n,).
-
-    Steps where the component does not vary are left out; a component that never varies has the
-    share 1.
-    """
-    squares = comparison.sums.means("square")
-    square, base = (squares[comparison.names.index(key)] for key in (name, UNMEASURED))
-    used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
-    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0)
-    count = used.sum(axis=0)
-    return Estimate.jackknife(np.where(count > 0, share / np.maximum(count, 1), 1.0))
-
-
-def not_diverging(comparison: Comparison) -> Finding | None:
+def not_diverging(result: Comparison, x: Array) -> Finding | None:
     """The filter that is DIVERGED times worse than no measurements; None if there is none."""
-    worst, name = max(
-        (float(shares(comparison, name).value.max()), name) for name in measured(comparison)
-    )
+    worst, name = max(zip(shares(result, x).value.max(axis=1), result.names, strict=True))
     if worst <= DIVERGED:
         return None
     claim = f"its error variance is {worst:.3g} times that without measurements"
-    return Finding(False, f"{title(name)} diverges: {claim}", worst)
+    return Finding(False, f"{title(name)} diverges: {claim}", float(worst))
 
 
-def observable(comparison: Comparison, x: Array) -> Finding:
+def observable(result: Comparison, x: Array) -> Finding:
     """Whether the meter tells something about every component of the state.  Value: the worst
     component's share.
 
     The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN.
     """
-    estimates = [shares(comparison, name) for name in measured(comparison)]
-    upper = np.min([share.value + 4 * share.standard_error for share in estimates], axis=0)
-    worst, names = int(np.argmax(upper)), comparison.model.x
-    share = float(min(estimate.value[worst] for estimate in estimates))
+    estimates, names = shares(result, x), result.model.x
     constant = ~varies(x).any(axis=0)
     if constant.any():
         still = f"{names[int(np.argmax(constant))]} does not vary, there is nothing to estimate"
-        return Finding(False, still, share)
+        return Finding(False, still)
+    upper = (estimates.value + 4 * estimates.standard_error).min(axis=0)
+    worst = int(np.argmax(upper))
+    share = float(estimates.value[:, worst].min())
     left = f"the best filter leaves {100 * share:.3g} % of the variance of {names[worst]}"
     ok = bool(upper[worst] < UNSEEN)
     return Finding(ok, left if ok else f"the meter hardly tells: {left}", share)
 
 
-def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
-    """Whether two filters differ in error variance by more than the statistical error, at a step or
-    on average.
-
-    |D_a - D_b| > t SE + c D / runs.  t is Student's quantile of SIGNIFICANCE, shared by all pairs
-    and steps (Bonferroni).  The second term is for the `designed` filters, whose coefficients are
-    fitted over as many trajectories: each costs 1/runs of the
-    error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value:
-    the largest significant difference, relative to the error variance of the control.
-    """
-    pairs = list(combinations(measured(comparison), 2))
-    tests = max(len(pairs), 1) * (comparison.steps + 1)
-    fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
-    control = comparison.error_variance(comparison.control).value
-    largest, says = (
-        0.0,
-        f"no two filters differ by more than the statistical error of {comparison.runs} "
-        f"trajectories",
-    )
-    for pair in pairs:
-        difference, score = comparison.difference(*pair), comparison.mean_gap_difference(*pair)
-        relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
-        error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
-        quantile = scipy.special.stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
-        allowed = quantile * error + ROUNDING + (0.0 if set(pair).isdisjoint(designed) else fitted)
-        step = int(np.argmax(significant := np.where(relative > allowed, relative, 0.0)))
-        if significant[step] > largest:
-            largest = float(significant[step])
-            when = f"at step {step}" if step < comparison.steps else "on average"
-            says = f"{' and '.join(map(title, pair))} differ by {100 * largest:.2g} % {when}"
-    return Finding(largest > 0, says, largest)
+def differences(result: Comparison) -> Finding:
+    """Whether the least accurate filter is significantly worse than the most accurate, on average
+    or at some step (`Comparison.verdicts`).  Value: the largest such difference over the error
+    variance of the control."""
+    control = result.error_variance(result.control).value
+    found = {
+        (best, worst, f"at step {k}"): float(result.difference(worst, best).value[k] / control[k])
+        for k, (best, _, worst) in enumerate(result.verdicts(1 - SIGNIFICANCE))
+        if worst
+    }
+    ranked = [name for name, _ in result.ranking()]
+    best, worst = ranked[0], ranked[-1]
+    difference = result.mean_gap_difference(worst, best)
+    if difference.p_value() < SIGNIFICANCE / len(ranked) ** 2:  # the pair was chosen
+        found[best, worst, "on average"] = float(difference.value)
+    if not found:
+        error = f"the statistical error of {result.runs} trajectories"
+        return Finding(False, f"no two filters differ by more than {error}", 0.0)
+    (best, worst, when), largest = max(found.items(), key=lambda item: item[1])
+    names = f"{title(best)} and {title(worst)}"
+    return Finding(True, f"{names} differ by {100 * largest:.2g} % {when}", largest)
 
 
 def solvable(structures: Structures) -> Finding:
     """Whether the structural functions have a closed form of sensible length.  Value: operations of
     the Gaussian ones."""
     try:
-        parts = [*structures.gaussian.formulas.functions.values()]
+        count = operations(structures.gaussian)
         _ = structures.linearised
     except NoClosedForm as error:
         return Finding(False, str(error))
-    count = sum(int(formula.count_ops()) for formula in sp.flatten(parts))
     says = f"closed form, {count} operations in the Gaussian structural functions"
     too_long = f", more than {LONGEST}" if count > LONGEST else ""
     return Finding(not too_long, says + too_long, float(count))

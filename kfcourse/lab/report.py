@@ -32,14 +32,13 @@ from kfcourse.lab.admission import Admission
 from kfcourse.lab.report_modes import JumpReport
 from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
-from kfcourse.lab.short_names import JUMP_FILTERS, title
+from kfcourse.lab.short_names import title
 from kfcourse.lab.variants import Variant
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
-from kfcourse.symbolic.model import Model
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "report.toml").read_text(encoding="utf-8"))
 LANGUAGES = tuple(WORDS)
@@ -48,14 +47,6 @@ STANDARD_OUTPUT = ("-", "/dev/stdout")
 # the line's own &
 ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-
-
-FIGURES: dict[str, Callable[..., Axes]] = {
-    "accuracy": plots.accuracy,
-    "relative": plots.relative_accuracy,
-    "ranking": plots.ranking,
-    "consistency": plots.consistency,
-}
 
 
 def write_report(
@@ -71,8 +62,8 @@ def write_report(
     `known` are the filters that the model may admit, of which the report has a table; `modes` are
     the `recognised_modes`.
     """
-    report = _report(result, language, modes)
-    report.known = known
+    report = _report(result, language, known)
+    report.recognised = modes
     content = {
         "blocks": list(report.blocks()),
         "words": report.words,
@@ -84,7 +75,7 @@ def write_report(
     )
     with replacing_together(folder) as place:
         for name in report.figures:
-            save_figure(partial(FIGURES[name], result, words=labels), place, name)
+            save_figure(partial(plots.FIGURES[name], result, words=labels), place, name)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "modes")
         save_texts(("report.html", "report.tex"), place, content)
@@ -92,14 +83,10 @@ def write_report(
 
 
 def _report(
-    result: Comparison, language: str = "en", modes: Recognised | None = None
+    result: Comparison, language: str = "en", known: Sequence[Admission] = ()
 ) -> StudentReport:
-    words = WORDS[language]
-    return (
-        JumpReport(result, words, modes)
-        if isinstance(result.model, JumpModel)
-        else StudentReport(result, words)
-    )
+    jumps = isinstance(result.model, JumpModel)
+    return (JumpReport if jumps else StudentReport)(result, WORDS[language], known)
 
 
 def remarks_in_words(result: Comparison) -> list[str]:
@@ -153,7 +140,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     ranking = [name for name, _ in result.ranking()]
     data: dict[str, Any] = {
         "variant": variant.name,
-        "model": _model_in_numbers(result.model),
+        "model": variant.table,
         "runs": result.runs,
         "steps": result.steps,
         "seed": result.seed,
@@ -171,7 +158,8 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         data["above_bound"] = lists(result.gap, names=result.entrants)
         data["above_bound_standard_error"] = lists(result.gap, "standard_error", result.entrants)
         data["mean_above_bound"] = {name: _number(result.mean_gap(name)) for name in ranking}
-    text = json.dumps(_finite(data), indent=1, allow_nan=False)
+    # infinite and undefined numbers as null: JSON has none
+    text = json.dumps(json.loads(json.dumps(data), parse_constant=lambda _: None), indent=1)
     if str(path) in STANDARD_OUTPUT:
         print(text, flush=True)
     else:
@@ -181,30 +169,6 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
 
 def _number(estimate: Estimate) -> dict[str, float]:
     return {"value": float(estimate.value), "standard_error": float(estimate.standard_error)}
-
-
-def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
-    if isinstance(model, JumpModel):
-        modes = {
-            name: _model_in_numbers(mode)
-            for name, mode in zip(model.names, model.modes, strict=True)
-        }
-        return {
-            "modes": modes,
-            "transition": [list(map(str, row)) for row in model.chain.tolist()],
-            "first": model.first.tolist(),
-        }
-
-    moves, object_ = model.between, {"state": model.state_equation}
-    if moves is not None:  # of the diffusion its rows
-        object_ = {"drift": moves.drift, "diffusion": moves.diffusion.tolist()}
-    equations = {**object_, "meter": model.meter_equation}
-    return {
-        **{name: [*map(str, formulas)] for name, formulas in equations.items()},
-        "parameters": {name: float(value) for name, value in model.parameters.items()},
-        "inputs": {name: list(values) for name, values in model.known.inputs.items()},
-        "interval": float(model.known.interval),
-    }
 
 
 def conclusions(result: Comparison) -> list[str]:
@@ -252,30 +216,13 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
     model = result.model
     if not isinstance(model, JumpModel):
         return None
-    of_modes = [
-        built
-        for built in filters
-        if isinstance(built, Filter)
-        and built.name in result.names
-        and JUMP_FILTERS[built.name].modes
-    ]
-    return (
-        recognised(of_modes, model, min(result.runs, RECOGNISED), result.steps, result.seed)
-        if of_modes
-        else None
-    )
+    known = [filter_ for filter_ in filters if filter_.name in result.names]
+    runs = min(result.runs, RECOGNISED)
+    told = recognised(known, model, runs, result.steps, result.seed)
+    return told if told.share else None
 
 
 def _mathml(line: str) -> str:
     """One line of an aligned block as MathML, which browsers show without any script; columns of
     its matrices stay apart."""
     return mathml(ALIGNMENT.sub(lambda match: match["inner"] or "", line))
-
-
-def _finite(data: Any) -> Any:
-    """Infinite and undefined numbers as null: JSON has none."""
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_finite(value) for value in data]
-    return data if not isinstance(data, float) or np.isfinite(data) else None

@@ -4,8 +4,9 @@ comparison and conclusion; of models with modes see `report_modes`."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ import sympy as sp
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
+from kfcourse.filters.exact.laws import modes_of
+from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import FAMILIES
@@ -28,18 +31,19 @@ from kfcourse.lab.report_text import (
     ranges,
     written_lines,
 )
-from kfcourse.lab.short_names import FILTERS, Entry, Structures
+from kfcourse.lab.short_names import Structures, entry
 from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
+from kfcourse.montecarlo.modes import Recognised
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
-from kfcourse.symbolic.structure import FUNCTION_LATEX
+from kfcourse.symbolic.structure import FUNCTION_LATEX, Structure
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
 ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
-FIGURES = ("accuracy", "relative", "ranking", "consistency")
 HIGHEST = 8  # moment that is printed
 
 # Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
@@ -73,28 +77,32 @@ def formulas(lines: list[str]) -> Block:
 class StudentReport:
     """The blocks of the report, section by section."""
 
-    entries: Mapping[str, Entry] = FILTERS  # where filters have their names from
-
-    def __init__(self, result: Comparison, words: dict[str, str]) -> None:
-        self.result, self.words = result, words
-        # of an object that moves in continuous time: some words are others
-        moves = getattr(result.model, "between", None)
-        self.kind, self.numbers = "", {}
-        if moves is not None:
-            accuracy = number_latex(moves.accuracy)
-            self.kind, self.numbers = "_between", {"substeps": moves.substeps, "accuracy": accuracy}
+    def __init__(
+        self, result: Comparison, words: dict[str, str], known: Sequence[Admission] = ()
+    ) -> None:
+        self.result, self.words, self.known = result, words, known
         self.model: Any = result.model
-        self.structures = Structures(self.model)
-        # kinds whose formulas are found in time, and are not too long
+        self.structures = Structures.of(self.model)
+        self.modes, self.jumps = modes_of(self.model), self.structures.jumps
+        self.recognised: Recognised | None = None
+        # of an object that moves in continuous time: some words are others
+        self.moves = self.modes[0].between
+        self.kind, self.numbers = "", {}
+        if self.moves is not None:
+            accuracy = number_latex(self.moves.accuracy)
+            self.kind = "_between"
+            self.numbers = {"substeps": self.moves.substeps, "accuracy": accuracy}
+        self.scalar = self.model.n == self.model.p == 1
+        used = {entry(name).functions for name in result.names}
+        if self.jumps:  # of the filters whose names do not tell
+            used.add(self.structures.best[0].name)
+        self.kinds = [kind for kind in ("linearised", "gaussian") if kind in used]
+        # kinds whose formulas are not too long
         self.derivable: list[str] = []
-        self.known: Sequence[Admission] = ()
-        self.kinds = [
-            kind
-            for kind in ("linearised", "gaussian")
-            if any(name.endswith(kind) for name in result.names)
-        ]
         compared = result.has_bound or len(result.entrants) > 1
-        self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
+        self.figures = [
+            name for name in plots.FIGURES if compared or name not in ("relative", "ranking")
+        ]
 
     def blocks(self) -> Iterator[Block]:
         """The whole report; the words that SymPy puts into formulas in its language, too."""
@@ -126,66 +134,130 @@ class StudentReport:
         yield from self.conclusion()
         if self.known:
             yield self.section("admitted")
-            heading = [
-                self.words["filter"],
-                self.words["admitted_verdict"],
-                self.words["admitted_why"],
-            ]
+            words, why = self.words, partial(cause, model=self.model, words=self.words)
+            heading = [words["filter"], words["admitted_verdict"], words["admitted_why"]]
             rows = [
                 [
                     self.title(answer.name),
-                    self.words[f"admitted_{answer.verdict}"],
-                    self.why(answer),
+                    words[f"admitted_{answer.verdict}"],
+                    why(answer.reason) if answer.reason else answer.says,
                 ]
                 for answer in self.known
             ]
-            yield Block("table", self.words["admitted_text"], heading, rows)
-
-    def why(self, answer: Admission) -> str:
-        """Why a filter is not admitted, or what to know of it."""
-        return cause(answer.reason, self.result.model, self.words) if answer.reason else answer.says
+            yield Block("table", words["admitted_text"], heading, rows)
 
     def task(self) -> Iterator[Block]:
-        model, moves = self.model, self.model.between
+        model, moves, words = self.model, self.moves, self.words
         yield self.section("task")
-        yield self.text("task_text")
-        lines = lines_of(model.latex(values=False, indexed=True))
-        if moves is None and model.n == model.p == 1:  # what a and b are called below
-            k = ", k" if model.timed else ""
-            for i, call in enumerate((f"a(x_k, v_k{k})", f"b(x_k, w_k{k})")):
-                lines[i] = lines[i].replace("&=", f"&= {call} =", 1)
-        yield formulas([*lines, *model.known.latex("t" if moves is None else "t_{k}")])
+        yield self.text("task_modes_text" if self.jumps else "task_text", modes=len(self.modes))
+        yield from self.in_modes(self.equations)
         if moves is not None and any(moves.correction):
             yield self.text("stratonovich")
             added = enumerate(moves.correction, 1)
             yield formulas([rf"\Delta a_{i} &= {formula_latex(of, model.x)}" for i, of in added])
+        names = dict.fromkeys(name for mode in self.modes for name in mode.values)
+        common = [
+            name for name in names if len({mode.values.get(name) for mode in self.modes}) == 1
+        ]
         values = ", ".join(
-            f"${sp.latex(name)} = {number_latex(float(value))}$"
-            for name, value in model.values.items()
+            f"${sp.latex(name)} = {number_latex(float(self.modes[0].values[name]))}$"
+            for name in common
         )
         if values:
-            yield self.text("parameters", values=values)
-        laws = {"x_0": model.prior, "v_k": model.state_noise, "w_k": model.meter_noise}
-        if moves is not None:
-            del laws["v_k"]
-        yield formulas([rf"{name} &\sim {law(of)}" for name, of in laws.items()])
+            yield self.text("common_parameters" if self.jumps else "parameters", values=values)
+        if self.jumps:
+            own = [name for name in names if name not in common]
+            heading = ["$j$", words["mode"], *(f"${sp.latex(name)}$" for name in own)]
+            rows = [
+                [f"${j}$", name, *(_value(mode, key) for key in own)]
+                for j, (name, mode) in enumerate(zip(model.names, self.modes, strict=True), 1)
+            ]
+            yield Block("table", words["modes_table"], heading, rows)
+        yield self.text("laws")
+        laws = [rf"x_0 &\sim {law(model.prior)}"]
+        for symbol, noise in (("v_k", "state_noise"), ("w_k", "meter_noise"))[moves is not None :]:
+            each = [law(getattr(mode, noise)) for mode in self.modes]
+            if len({*each}) == 1:
+                laws.append(rf"{symbol} &\sim {each[0]}")
+            else:
+                laws += [rf"{symbol}^{{{j}}} &\sim {of}" for j, of in enumerate(each, 1)]
+        yield formulas(laws)
+        if self.jumps:
+            yield self.text("chain")
+            chain = (
+                rf"\pi &= \left(\mathsf{{P}}(i_{{k+1}} = j \mid i_k = i)\right)_{{ij}} = "
+                rf"{sp.latex(model.chain)}"
+            )
+            yield formulas([chain, rf"q &= {matrix(model.first[None])}"])
         yield self.text("independent")
-        yield self.text(
-            "find", filters=", ".join(self.title(name) for name in self.result.entrants)
-        )
+        titles = ", ".join(map(self.title, self.result.entrants))
+        yield self.text("find_modes" if self.jumps else "find", filters=titles)
+
+    def in_modes(
+        self, make: Callable[[Model], Iterable[Block]], every: str = ""
+    ) -> Iterator[Block]:
+        """What `make` says of each mode; once if it says the same of all, after the words
+        `every`."""
+        each = [list(make(mode)) for mode in self.modes]
+        if all(blocks == each[0] for blocks in each):
+            if every and self.jumps:
+                yield self.text(every)
+            yield from each[0]
+            return
+        for j, (name, blocks) in enumerate(zip(self.model.names, each, strict=True), 1):
+            yield self.text("in_mode", j=f"$j={j}$", name=name)
+            yield from blocks
+
+    def equations(self, mode: Model) -> list[Block]:
+        lines = lines_of(mode.latex(values=False, indexed=True))
+        if self.moves is None and self.scalar and not self.jumps:  # what a and b are called below
+            k = ", k" if mode.timed else ""
+            for i, call in enumerate((f"a(x_k, v_k{k})", f"b(x_k, w_k{k})")):
+                lines[i] = lines[i].replace("&=", f"&= {call} =", 1)
+        return [formulas([*lines, *mode.known.latex("t" if self.moves is None else "t_{k}")])]
 
     def functions(self) -> Iterator[Block]:
         if self.kinds:
             yield self.section("functions")
+            if self.jumps:
+                yield self.text("functions_modes")
         for kind in self.kinds:
-            yield from self.defined(kind)
-            if self.model.n == self.model.p == 1:
-                yield from getattr(self, kind)()
-            yield from self.derived(kind)
+            yield Block("subsection", self.words[kind])
+            yield self.text(f"{kind}_text")
+            yield formulas(self.phrase(f"{kind}_formulas").split("\n"))
+            yield from self.in_modes(partial(self.derived, kind), "in_every_mode")
 
-    def linearised(self) -> Iterator[Block]:
+    def derived(self, kind: str, mode: Model) -> Iterator[Block]:
+        """The five functions of a mode, of a scalar model step by step, with their numbers in the
+        catalogue where it has them."""
+        if self.scalar:
+            yield from getattr(self, kind)(mode)
+        try:
+            structure: Structure = getattr(Structures.of(mode), kind)
+        except NoClosedForm:
+            checked = self.structures.quadrature
+            assert isinstance(checked, Checked)  # else no filter with these functions takes part
+            yield self.text("by_quadrature", order=checked.order)
+            return
+        yield self.text("result")
+        if (lines := printed(structure)) is None:
+            yield self.text("not_printed")
+            return
+        self.derivable.append(kind)
+        yield formulas(lines)
+        if self.scalar and structure.formulas:
+            known = structure.formulas.functions
+            numbers = ", ".join(
+                f"${FUNCTION_LATEX[name]}$ — {number}"
+                for (name, form), number in CATALOGUE.items()
+                if name in known and form == str(sp.expand(structure[name]))
+            )
+            if numbers:
+                yield self.text("catalogue", numbers=numbers)
+
+    def linearised(self, model: Model) -> Iterator[Block]:
         """The derivatives of a scalar model."""
-        model, moves = self.model, self.model.between
+        moves = self.moves
         object_ = (model.state_equation, model.v) if moves is None else (moves.drift, ())
         sides = ((*object_, "a", "v"), (model.meter_equation, model.w, "b", "w"))
         derivatives = [
@@ -200,12 +272,12 @@ class StudentReport:
         yield self.text("derivatives")
         yield formulas(derivatives)
 
-    def gaussian(self) -> Iterator[Block]:
+    def gaussian(self, model: Model) -> Iterator[Block]:
         """The means of a scalar model, step by step."""
-        if conditional := self.conditional():
+        if conditional := self.conditional(model):
             yield self.text("conditional")
             yield formulas(conditional)
-        if moments := self.moments():
+        if moments := self.moments(model):
             yield self.text("recursion")
             yield formulas(
                 [r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments]
@@ -213,13 +285,13 @@ class StudentReport:
         elif not self.structures.quadrature:
             yield self.text("exponentials")
 
-    def conditional(self) -> list[str]:
+    def conditional(self, model: Model) -> list[str]:
         """Means of a, a^2, b, b^2 over their noise, at a fixed state; a drift has none."""
-        model, lines = self.model, []
+        lines = []
         for formula, noises, noise, first, second in (
             (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
             (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
-        )[model.between is not None :]:
+        )[self.moves is not None :]:
             over = GaussianMoments(
                 list(noises), list(exact_matrix(noise.mean)), sp.Matrix(exact_matrix(noise.cov))
             )
@@ -232,10 +304,10 @@ class StudentReport:
                 lines.append(f"{letter}(x) &= {formula_latex(mean, model.x)}")
         return lines
 
-    def moments(self) -> list[str]:
+    def moments(self, model: Model) -> list[str]:
         """The moments q_2 ... that the meter and the object need, if they are polynomials."""
-        (x,), moves = self.model.x, self.model.between
-        sides = [self.model.state_equation[0] ** 2, self.model.meter_equation[0] ** 2]
+        (x,), moves = model.x, self.moves
+        sides = [model.state_equation[0] ** 2, model.meter_equation[0] ** 2]
         if moves is not None:
             sides[:1] = moves.drift[0], (moves.diffusion * moves.diffusion.T)[0]
         if not all(side.is_polynomial(x) for side in sides):
@@ -248,35 +320,6 @@ class StudentReport:
             for n in range(2, highest + 1)
         ]
 
-    def derived(self, kind: str) -> Iterator[Block]:
-        """The five functions, with their numbers in the catalogue where it has them."""
-        if kind == "gaussian" and isinstance(checked := self.structures.quadrature, Checked):
-            yield self.text("by_quadrature", order=checked.order)
-            return
-        yield self.text("result")
-        if (lines := printed(self.structures, kind)) is None:
-            yield self.text("not_printed")
-            return
-        self.derivable.append(kind)
-        yield formulas(lines)
-        if self.model.n == self.model.p == 1:
-            structure = getattr(self.structures, kind)
-            functions = structure.formulas.functions
-            forms = {name: (name, str(sp.expand(structure[name]))) for name in functions}
-            numbers = [
-                f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}"
-                for name, form in forms.items()
-                if form in CATALOGUE
-            ]
-            if numbers:
-                yield self.text("catalogue", numbers=", ".join(numbers))
-
-    def defined(self, kind: str) -> Iterator[Block]:
-        """The heading of a kind of structural functions, and what they are."""
-        yield Block("subsection", self.words[kind])
-        yield self.text(f"{kind}_text")
-        yield formulas(self.phrase(f"{kind}_formulas").split("\n"))
-
     def filters(self) -> Iterator[Block]:
         words = self.words
         yield self.section("filters")
@@ -285,44 +328,29 @@ class StudentReport:
         yield formulas(
             [rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"]
         )
-        families = dict.fromkeys(self.entries[name].family for name in self.result.entrants)
+        families = dict.fromkeys(entry(name).family for name in self.result.entrants)
         designed = next((family for family in families if family != "aof"), "")
         for family in filter(EQUATIONS.get, families):
-            heading = (
-                FAMILIES[family].russian_heading
-                if words["language"] == "ru"
-                else FAMILIES[family].heading
-            )
-            yield Block("subsection", heading)
+            yield Block("subsection", getattr(FAMILIES[family], words["field_of_heading"]))
             if family == "duof":
                 yield self.text("criteria")
                 yield formulas(self.phrase("criteria_formulas").split("\n"))
             yield formulas(lines_of(equations_latex(EQUATIONS[family])))
-            if family == "aof" and self.model.n == self.model.p == 1:
-                for name in (
-                    f"aof-{kind}"
-                    for kind in self.derivable
-                    if f"aof-{kind}" in self.result.entrants
-                ):
-                    yield self.text("written_out", name=self.title(name))
-                    yield formulas(
-                        written_lines(getattr(self.structures, name.removeprefix("aof-")))
-                    )
+            for kind in self.derivable if family == "aof" and self.scalar else ():
+                if f"aof-{kind}" in self.result.entrants:
+                    yield self.text("written_out", name=self.title(f"aof-{kind}"))
+                    yield formulas(written_lines(getattr(self.structures, kind)))
             if family == designed:
                 yield self.text("over_ensemble")
 
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
         yield self.section("experiment")
-        sentences = [
-            self.phrase(
-                "experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed)
-            )
-        ]
+        size = {"runs": result.runs, "steps": result.steps, "seed": str(result.seed)}
+        sentences = [self.phrase("experiment_text", **size)]
         if result.designed:
-            sentences.append(
-                self.phrase("designs", filters=", ".join(map(self.title, result.designed)))
-            )
+            titles = ", ".join(map(self.title, result.designed))
+            sentences.append(self.phrase("designs", filters=titles))
         if result.has_bound:
             sentences.append(words["exact"])
         yield Block("text", " ".join(sentences))
@@ -336,12 +364,8 @@ class StudentReport:
                 [f"${k}$", *(power_of_ten(estimate[k]) for estimate in estimates)]
                 for k in table_steps(result)
             ]
-            yield Block(
-                "table",
-                words["table_goes_on" if start else "table"],
-                ["$k$", *map(self.title, names)],
-                rows,
-            )
+            caption = words["table_goes_on" if start else "table"]
+            yield Block("table", caption, ["$k$", *map(self.title, names)], rows)
         for text in self.remarks():
             yield Block("text", text)
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
@@ -351,23 +375,22 @@ class StudentReport:
             )
         if "ranking" in self.figures:
             rows = [
-                [
-                    self.title(name),
-                    words["diverges"] if name in result.lost else in_percent(gap),
-                ]
+                [self.title(name), words["diverges"] if name in result.lost else in_percent(gap)]
                 for name, gap in result.ranking()
             ]
-            yield Block(
-                "table",
-                self.phrase("ranking_table", reference=reference),
-                [words["filter"], "%"],
-                rows,
-            )
+            caption = self.phrase("ranking_table", reference=reference)
+            yield Block("table", caption, [words["filter"], "%"], rows)
         if result.scored:
             below = self.phrase("score_below", name=self.title(result.reference))
             heading = [words["filter"], words["log_score"], below, "CRPS"]
             rows = [[self.title(name), *score_cells(result, name)] for name in result.names]
             yield Block("table", self.phrase("scores_table", level=LEVEL), heading, rows)
+        if modes := self.recognised:
+            rows = [[self.title(name), in_percent(share)] for name, share in modes.share.items()]
+            guess = [words["guess"], f"${100 * modes.guess:.1f}$"]
+            heading = [words["filter"], words["share"]]
+            yield Block("table", words["share_table"], heading, [*rows, guess])
+            yield Block("figure", words["figure_modes"], ["modes"])
 
     def remarks(self) -> Iterator[str]:
         """What a reader must know before he relies on distances from the bound."""
@@ -469,9 +492,13 @@ class StudentReport:
         )
 
     def title(self, name: str) -> str:
-        entry = self.entries[name]
-        exact = self.words["exact_title"] if name == EXACT else ""
-        return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
+        field_ = self.words["field_of_title"]
+        return self.words["exact_title"] if name == EXACT else str(getattr(entry(name), field_))
+
+
+def _value(mode: Model, name: sp.Symbol) -> str:
+    """A parameter's value in a mode, if it is one there."""
+    return f"${number_latex(float(mode.values[name]))}$" if name in mode.values else "–"
 
 
 def score_cells(result: Comparison, name: str) -> list[str]:

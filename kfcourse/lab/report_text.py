@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -14,9 +15,8 @@ from kfcourse.errors import NotFinite, Reason, Refused
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
 from kfcourse.filters.programs import function_values, scalar
-from kfcourse.lab.short_names import Structures
+from kfcourse.lab.short_names import operations
 from kfcourse.laws import Array, Gaussian
-from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
@@ -25,8 +25,7 @@ from kfcourse.symbolic.structure import Structure
 from kfcourse.symbolic.typesetting import WIDTH, joined, symbols
 from kfcourse.symbolic.writing import by_thousands, formula_latex, formula_lines, number_latex
 
-FORMULAS = 60.0  # seconds that each kind of structural functions may take
-LONGEST = 40_000  # characters of LaTeX: some ten pages
+LONGEST = 6_000  # operations in formulas that are printed: some eight pages
 SHORT = WIDTH // 3  # symbols of h and G that are put into K and z; longer ones keep their own lines
 
 
@@ -64,21 +63,9 @@ def lines_of(block: str) -> list[str]:
     return [line.strip() for line in body.split("\\\\\n")]
 
 
-def printed(structures: Structures, kind: str) -> list[str] | None:
-    """The lines of the structural functions of a kind; None if they are not found in time, or too
-    long to print.
-
-    Raises
-    ------
-    NoClosedForm
-        There are no formulas.
-    """
-    try:
-        with time_limit(FORMULAS):
-            block = getattr(structures, kind).latex()
-    except OutOfTime:
-        return None
-    return lines_of(block) if len(block) <= LONGEST else None
+def printed(structure: Structure) -> list[str] | None:
+    """The lines of structural functions; None if they are too long to print."""
+    return lines_of(structure.latex()) if operations(structure) <= LONGEST else None
 
 
 def law(given: Gaussian) -> str:
@@ -97,16 +84,23 @@ def matrix(values: Array) -> str:
 
 def power_of_ten(estimate: Estimate) -> str:
     """A value and its standard error on one power of ten: (6.51 ± 0.07)·10^-4."""
-    value, error, power = on_one_power(estimate)
-    if power is None:
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if not (np.isfinite(value) and value):
         return f"${value:g}$" if np.isfinite(value) else r"$\infty$"
-    return rf"$({value:.3f} \pm {error:.3f})\cdot 10^{{{power}}}$"
+    power = int(np.floor(np.log10(abs(value))))
+    scaled = f"{value / 10.0**power:.3f} \\pm {error / 10.0**power:.3f}"
+    return rf"$({scaled})\cdot 10^{{{power}}}$"
 
 
-def in_percent(estimate: Estimate) -> str:
-    """A part and its standard error in per cent, as a formula."""
-    text = percent(estimate)
-    return text if text == "–" else "$" + text.replace("±", r"\pm") + "$"
+def in_percent(part: Estimate) -> str:
+    """A part and its standard error in per cent, the latter with two digits: 1.19 ± 0.40; "–" where
+    there is none."""
+    value, error = 100 * float(part.value), 100 * float(part.standard_error)
+    if np.isnan(value):
+        return "–"
+    exact = not (np.isfinite(error) and error > 0)
+    places = 2 if exact else int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    return rf"${value:.{places}f} \pm {error:.{places}f}$"
 
 
 def inline_html(text: str) -> str:
@@ -121,15 +115,7 @@ def inline_html(text: str) -> str:
 def inline_tex(text: str) -> str:
     """Text for LaTeX: special characters escaped outside of $formulas$."""
     pieces = re.split(r"(\$[^$]+\$)", text)
-    return "".join(
-        piece if i % 2 else _typeset(escape_tex(piece)) for i, piece in enumerate(pieces)
-    )
-
-
-def _typeset(text: str) -> str:
-    return (
-        text.replace("–", "--").replace("—", "---").replace("\u202f", r"\,").replace("\u00a0", "~")
-    )
+    return "".join(piece if i % 2 else escape_tex(piece) for i, piece in enumerate(pieces))
 
 
 def ranges(steps: Sequence[int], form: str = "{}") -> str:
@@ -145,38 +131,20 @@ def ranges(steps: Sequence[int], form: str = "{}") -> str:
     )
 
 
-def percent(part: Estimate) -> str:
-    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"; "–"
-    where there is none."""
-    if np.isnan(part.value):
-        return "–"
-    value, error = 100 * float(part.value), 100 * float(part.standard_error)
-    places = (
-        int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
-    )
-    return f"{value:.{places}f} ± {error:.{places}f}"
-
-
-def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
-    """Value and standard error over the power of ten of the value, and that power; None for zero
-    and what is not finite."""
-    value, error = float(estimate.value), float(estimate.standard_error)
-    if not (np.isfinite(value) and value):
-        return value, error, None
-    power = int(np.floor(np.log10(abs(value))))
-    return value / 10.0**power, error / 10.0**power, power
-
-
 def escape_tex(text: str) -> str:
     """Plain text for LaTeX."""
-    special = {
+    special: dict[str, Any] = {
         "\\": r"\textbackslash{}",
         "^": r"\textasciicircum{}",
         "~": r"\textasciitilde{}",
         "±": r"$\pm$",
         "·": r"$\cdot$",
-    }
-    return re.sub(r"[#$%&_{}\\^~±·]", lambda match: special.get(match[0], "\\" + match[0]), text)
+        "–": "--",
+        "—": "---",
+        "\u202f": r"\,",
+        "\u00a0": "~",
+    } | {sign: "\\" + sign for sign in "#$%&_{}"}
+    return text.translate(str.maketrans(special))
 
 
 def cause(reason: Reason, model: Model | JumpModel, words: Mapping[str, str]) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
+import sympy as sp
+
 from kfcourse.filters import (
     Design,
     Filter,
@@ -56,6 +58,14 @@ class Structures:
         self.model: Any = model
         self.jumps = isinstance(model, JumpModel)
 
+    @classmethod
+    def of(cls, model: Model | JumpModel) -> Structures:
+        """Those of one of the models asked for last: comparison and report ask for the same, and
+        a pilot takes seconds."""
+        kept = next((known for known in _ASKED if known.model is model), None) or cls(model)
+        _ASKED.append(kept)
+        return kept
+
     @cached_property
     def linearised(self) -> Any:
         return self._each([linearised(mode) for mode in modes_of(self.model)])
@@ -65,13 +75,21 @@ class Structures:
         return self._each([gaussian(mode) for mode in modes_of(self.model)])
 
     @cached_property
+    def averaged(self) -> Structure:
+        """Averaged over the modes."""
+        return averaged(self.model, self.best)
+
+    @cached_property
     def quadrature(self) -> Checked | NoClosedForm | None:
         """What takes the place of the Gaussian functions if they have no closed form, or why
         nothing does; None if they have."""
         try:
             _ = self.gaussian
         except NoClosedForm as why:
-            return _by_quadrature(self.model, why)
+            try:
+                return of_checked_order(self.model, why)
+            except NoClosedForm as neither:
+                return neither
         return None
 
     @property
@@ -90,30 +108,13 @@ class Structures:
         return structures if self.jumps else structures[0]
 
 
-class JumpStructures(Structures):
-    """Those of a model that jumps: of each mode, and averaged over the modes."""
-
-    @cached_property
-    def averaged(self) -> Structure:
-        return averaged(self.model, self.best)
+def operations(structure: Structure) -> int:
+    """How many there are in the formulas of structural functions."""
+    parts = structure.formulas.functions.values() if structure.formulas else ()
+    return sum(int(formula.count_ops()) for formula in sp.flatten(parts))
 
 
-def _by_quadrature(model: Model | JumpModel, why: NoClosedForm) -> Checked | NoClosedForm:
-    """As `quadrature`; kept of the models asked for last, as a pilot takes seconds, and a report
-    asks again."""
-    for asked, kept in _ASKED:
-        if asked is model:
-            return kept
-    answer: Checked | NoClosedForm
-    try:
-        answer = of_checked_order(model, why)
-    except NoClosedForm as neither:
-        answer = neither
-    _ASKED.append((model, answer))
-    return answer
-
-
-_ASKED: deque[tuple[Model | JumpModel, Checked | NoClosedForm]] = deque(maxlen=4)
+_ASKED: deque[Structures] = deque(maxlen=4)
 
 
 class Entry(NamedTuple):
@@ -124,11 +125,8 @@ class Entry(NamedTuple):
         Of which structural functions: "gaussian", "linearised", "unscented", "gauss-hermite",
         "averaged" (over the modes), "best" (Gaussian if they can be had, else linearised); "exact";
         "" of none.
-    family, drawn : str
-        Keys of `FAMILIES`: of its equations, and of its colour and marker.
-    memory, modes : bool
-        Whether it remembers several steps, and whether its state has the probabilities of the
-        modes.
+    family : str
+        Key of `FAMILIES`.
     """
 
     title: str
@@ -136,9 +134,6 @@ class Entry(NamedTuple):
     build: Callable[[Any], Any]  # structures -> Filter or Design
     functions: str = ""
     family: str = ""
-    drawn: str = ""
-    memory: bool = False
-    modes: bool = False
 
 
 def _twice(
@@ -147,8 +142,6 @@ def _twice(
     number: str = "",
     russian: str = "",
     jump: bool = False,
-    memory: bool = False,
-    modes: bool = False,
 ) -> dict[str, Entry]:
     """The entries of "fos", or with a `number` of "fos3": with Gaussian structural functions and
     with linearised ones.
@@ -157,17 +150,19 @@ def _twice(
     each mode: the LD-GFOS.
     """
     of = FAMILIES[family]
-    drawn = family + number if family + number in FAMILIES else family
     middle, latin, cyrillic = ("jump-", "LD-", "лд") if jump else ("", "", "")
+    if of.memory:  # as the lab's filters remember
+        number, russian = str(STEPS), f", {STEPS} шага"
     return {
         f"{family}{number}-{middle}{functions}": Entry(
             f"{latin}{functions[0].upper()}{of.title}{number}",
             f"{letter}{of.russian}{cyrillic}{russian}",
             partial(_built, build, functions),
-            functions, family, drawn, memory, modes,
+            functions,
+            family,
         )
         for functions, letter in (("gaussian", "Г"), ("linearised", "Л"))
-    }  # fmt: skip
+    }
 
 
 def _built(
@@ -178,15 +173,21 @@ def _built(
 
 
 def _alone(
-    family: str, build: Callable[[Any], Filter | Design], functions: str = "", modes: bool = False
+    family: str, build: Callable[[Any], Filter | Design], functions: str = ""
 ) -> dict[str, Entry]:
     """The entry of a family that is a single filter."""
     of = FAMILIES[family]
-    return {family: Entry(of.title, of.russian, build, functions, family, family, modes=modes)}
+    return {family: Entry(of.title, of.russian, build, functions, family)}
 
 
-_MEMORY = (str(STEPS), f", {STEPS} шага")  # as the lab's filters remember it
-_EXACT = Entry("exact AOF", "АОФ", lambda s: exact(s.model), "exact", "aof", modes=True)
+def _averaged(family: str, build: Callable[[Structure], Filter | Design]) -> dict[str, Entry]:
+    """The entry of a filter of the average over the modes."""
+    of = FAMILIES[family]
+    names = f"{of.title} (averaged)", f"{of.russian} (среднее по режимам)"
+    return {f"{family}-averaged": Entry(*names, lambda s: build(s.averaged), "averaged", family)}
+
+
+_EXACT = Entry("exact AOF", "АОФ", lambda s: exact(s.model), "exact", "aof")
 # One line a filter: this is where a new one is added.
 FILTERS: dict[str, Entry] = {
     **_twice("aof", aof),
@@ -197,21 +198,16 @@ FILTERS: dict[str, Entry] = {
     **_twice("mfos", partial(mfos, arguments=3), "3", ", 3 арг."),
     **_twice("dfmp", dfmp),
     **_twice("mdfmp", mdfmp),
-    **_twice("fkp", fkp, *_MEMORY, memory=True),
-    **_twice("mfkp", mfkp, *_MEMORY, memory=True),
-    **_twice("dfkp", dfkp, *_MEMORY, memory=True),
-    **_twice("mdfkp", mdfkp, *_MEMORY, memory=True),
-    **_twice("fbp", fbp, *_MEMORY, memory=True),
+    **_twice("fkp", fkp),
+    **_twice("mfkp", mfkp),
+    **_twice("dfkp", dfkp),
+    **_twice("mdfkp", mdfkp),
+    **_twice("fbp", fbp),
     "aof-unscented": Entry(
-        "UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented", "aof", "aof"
+        "UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented", "aof"
     ),
     "aof-gauss-hermite": Entry(
-        "GHKF",
-        "АОФ, Гаусс–Эрмит",
-        lambda s: aof(gauss_hermite(s.model)),
-        "gauss-hermite",
-        "aof",
-        "aof",
+        "GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model)), "gauss-hermite", "aof"
     ),
     "aof-exact": _EXACT,
     **_alone("particle", lambda s: particle(s.model)),
@@ -219,42 +215,16 @@ FILTERS: dict[str, Entry] = {
 # The same for models that jump: filters that know the modes, and plain ones on the average over the
 # modes.
 JUMP_FILTERS: dict[str, Entry] = {
-    **_twice(
-        "aof",
-        lambda model, structures: logic_dynamic(structures, model, model.first),
-        jump=True,
-        modes=True,
-    ),
-    **_alone("imm", lambda s: imm(s.best, s.model, s.model.first), "best", modes=True),
-    **_alone("gpb2", lambda s: gpb2(s.best, s.model, s.model.first), "best", modes=True),
+    **_twice("aof", lambda model, each: logic_dynamic(each, model, model.first), jump=True),
+    **_alone("imm", lambda s: imm(s.best, s.model, s.model.first), "best"),
+    **_alone("gpb2", lambda s: gpb2(s.best, s.model, s.model.first), "best"),
     **_twice("fos", logic_dynamic_fos, jump=True),
-    **_twice("fkp", logic_dynamic_fkp, *_MEMORY, jump=True, memory=True),
-    **_twice("fbp", logic_dynamic_fbp, *_MEMORY, jump=True, memory=True),
-    "aof-averaged": Entry(
-        "AOF (averaged)",
-        "АОФ (среднее по режимам)",
-        lambda s: aof(s.averaged),
-        "averaged",
-        "aof",
-        "aof",
-    ),
+    **_twice("fkp", logic_dynamic_fkp, jump=True),
+    **_twice("fbp", logic_dynamic_fbp, jump=True),
+    **_averaged("aof", aof),
     **_alone("duof", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
-    "fos-averaged": Entry(
-        "FOS (averaged)",
-        "ФОС (среднее по режимам)",
-        lambda s: fos(s.averaged),
-        "averaged",
-        "fos",
-        "fos",
-    ),
-    "mfos-averaged": Entry(
-        "MFOS (averaged)",
-        "МФОС (среднее по режимам)",
-        lambda s: mfos(s.averaged),
-        "averaged",
-        "mfos",
-        "mfos",
-    ),
+    **_averaged("fos", fos),
+    **_averaged("mfos", mfos),
     "aof-exact": _EXACT,
 }
 # Printed names of filters that are not among the lab's.
@@ -262,7 +232,9 @@ TITLES = {"iterated-linearised": FAMILIES["iterated"].title, "iterated-unscented
 BOUND = 1000  # particles of the exact AOF where there are no point masses
 # As of models without jumps, those that remember several steps are asked for by name.
 JUMP_LAB = tuple(
-    name for name, known in JUMP_FILTERS.items() if name != "aof-exact" and not known.memory
+    name
+    for name, known in JUMP_FILTERS.items()
+    if name != "aof-exact" and not FAMILIES[known.family].memory
 )
 LAB = (
     "aof-gaussian",
@@ -285,16 +257,9 @@ def entry(name: str) -> Entry:
     usual = f"{family}{STEPS}-{functions}"
     if known := FILTERS.get(usual) or JUMP_FILTERS.get(usual):  # of another length of memory
         return known._replace(title=known.title.replace(str(STEPS), kind.removeprefix(family)))
-    drawn = next((key for key in (name, kind, family) if key in FAMILIES), family)
     printed = FAMILIES[name].title if name in FAMILIES else TITLES.get(name, name)
-    return Entry(
-        printed,
-        printed,
-        lambda _: check_names([name]),
-        functions.removeprefix("jump-"),
-        family,
-        drawn,
-    )
+    build = partial(check_names, [name])
+    return Entry(printed, printed, build, functions.removeprefix("jump-"), family)
 
 
 def title(name: str) -> str:
@@ -315,7 +280,7 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
         instead.
     """
     check_names(names)
-    structures = Structures(model)
+    structures = Structures.of(model)
     built = []
     for name in dict.fromkeys(names):
         try:
@@ -337,8 +302,8 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
 def judging(model: Model | JumpModel) -> Structure:
     """The structural functions by which predictions of measurements are judged: the best ones,
     averaged over modes."""
-    jumps = isinstance(model, JumpModel)
-    return JumpStructures(model).averaged if jumps else Structures(model).best
+    structures = Structures.of(model)
+    return structures.averaged if structures.jumps else structures.best
 
 
 def exact(model: Model | JumpModel) -> Filter:

@@ -175,7 +175,13 @@ class Comparison:
         return Estimate.jackknife(self._variance(name))
 
     def difference(self, first: str, second: str) -> Estimate:
-        """D_k(first) - D_k(second), (steps,), from paired trajectories; no finer than `gap`."""
+        """D_k(first) - D_k(second), (steps,), from paired trajectories; no finer than `gap`.
+
+        From the exact AOF it is what a filter is above the bound, by orthogonality: the error of
+        the posterior mean is uncorrelated with every function of the measurements, so
+        M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2.  The right side never sees the error
+        itself, so it is far less noisy as long as the two filters are close.
+        """
         difference = Estimate.jackknife(self._variance(first) - self._variance(second))
         return self._resolved(difference, self._variance(self.reference)[:, 0])
 
@@ -191,19 +197,9 @@ class Comparison:
 
     def bound(self) -> Estimate:
         """D_k of the exact AOF, (steps,), as the mean of its own variance."""
-        self._check_bound()
-        return Estimate.jackknife(self._variance(EXACT))
-
-    def excess(self, name: str) -> Estimate:
-        """D_k(name) - D_k(exact AOF), (steps,), by orthogonality.
-
-        The error of the posterior mean is uncorrelated with every function of the measurements, so
-        M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2.  The right side never sees the error
-        itself, so it is far less noisy than the paired difference as long as the two filters are
-        close.
-        """
-        self._check_bound()
-        return Estimate.jackknife(self._means("distance", name))
+        if not self.has_bound:
+            raise KeyError(f"the bound needs {EXACT} among the filters")
+        return self.error_variance(EXACT)
 
     def gap(self, name: str) -> Estimate:
         """How far above the bound a filter is, D_k(name) / D_k(exact AOF) - 1 per step, (steps,).
@@ -392,7 +388,3 @@ class Comparison:
             value = np.asarray(0.0 if self.without_error[chosen].all() else np.nan)
             return Estimate(value, value, 1)
         return Estimate.jackknife((numerator[counted] / denominator[counted]).mean(axis=0))
-
-    def _check_bound(self) -> None:
-        if not self.has_bound:
-            raise KeyError(f"the bound needs {EXACT} among the filters")

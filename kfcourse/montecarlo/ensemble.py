@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.errors import expect, expect_sizes
+from kfcourse.errors import NotFinite, expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.symbolic.equations import compile_model
@@ -24,6 +24,8 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory
+# of a state in continuous time: no physical one is so large, and its square is still finite
+LARGEST = 1e100
 
 
 class Instant(NamedTuple):
@@ -168,6 +170,12 @@ def _moving(model: Model) -> Advance:
         # a formula without noise and state is one constant for all trajectories
         y = np.broadcast_to(y, (len(x), model.p))
         x_next = np.broadcast_to(x_next, (len(x), model.n))
+        if model.between is not None and not (np.abs(x_next) < LARGEST).all():
+            raise NotFinite(
+                f"step {k} of {model}: a trajectory passes {LARGEST:g}: the drift outgrows the "
+                f"state, as x**3 does, or is too fast for {model.between.substeps} sub-steps an "
+                f"interval; check its sign, or give more `substeps`"
+            )
         return Instant(x, on_circle(y, model.angles.y), on_circle(x_next, model.angles.x))
 
     return advance

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.base import Filter
+from kfcourse.filters.designed import Design
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.statistics import Estimate
@@ -41,10 +42,10 @@ class Recognised(NamedTuple):
 
 
 def recognised(
-    filters: Sequence[Filter], model: JumpModel, runs: int, steps: int, seed: int
+    filters: Sequence[Filter | Design], model: JumpModel, runs: int, steps: int, seed: int
 ) -> Recognised:
-    """Run the filters that carry probabilities of modes on common trajectories; slow ones on an
-    eighth of them.
+    """Run those of the filters that carry probabilities of modes on common trajectories; slow ones
+    on an eighth of them.
 
     The standard errors are those of means over independent trajectories.
     """
@@ -53,6 +54,8 @@ def recognised(
     shown = int(np.argmax([len(np.unique(trajectory)) for trajectory in mode[:, :least].T]))
     share, there = {}, {}
     for filter_ in filters:
+        if not (isinstance(filter_, Filter) and hasattr(filter_.init(1).memory, "probability")):
+            continue
         size = least if filter_.slow else runs
         state, right = filter_.init(size), np.zeros(size)
         probabilities = []

@@ -51,7 +51,7 @@ class NotebookFailed(RuntimeError):
     """A notebook stopped; the message names it and the cell."""
 
 
-def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> NotebookNode:
+def execute(notebook: NotebookNode, name: str) -> NotebookNode:
     """Run a notebook in a new kernel and an empty folder.
 
     Parameters
@@ -60,13 +60,11 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         Not changed.
     name : str
         For messages.
-    stop_at_error : bool
-        False: an error is kept as the cell's output, and the cells after it run too.
 
     Raises
     ------
     NotebookFailed
-        A cell raises an error (if `stop_at_error`) or takes too long, or the kernel dies.
+        A cell raises an error or takes too long, or the kernel dies.
     """
     result = nbformat.from_dict(notebook)
     started: list[str] = []  # ids of cells: a running one has a number of execution already
@@ -74,7 +72,6 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         result,
         timeout=SECONDS,
         kernel_name="python3",
-        allow_errors=not stop_at_error,
         record_timing=False,
         on_cell_execute=lambda cell, cell_index: started.append(cell.id),
         extra_arguments=["--log-level=ERROR"],
@@ -95,7 +92,7 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
             raise NotebookFailed(
                 f"{name}, cell {started[-1]}: the kernel died (out of memory?)"
             ) from None
-    if stop_at_error and (failure := first_error(result)):
+    if failure := first_error(result):
         cell, shown = failure
         raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
@@ -188,22 +185,9 @@ def pdf(page: Path, target: Path) -> None:
             f"{page} yourself"
         )
     with tempfile.TemporaryDirectory() as profile:
-        command = [
-            browser,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            f"--user-data-dir={profile}",
-            "--no-pdf-header-footer",
-        ]
-        try:
-            done = subprocess.run(
-                [*command, f"--print-to-pdf={target}", page.resolve().as_uri()],
-                capture_output=True,
-                text=True,
-                timeout=PRINTING,
-            )
-        except subprocess.TimeoutExpired:
-            raise NotebookFailed(f"{browser} did not print {page} in {PRINTING} s") from None
+        command = [browser, "--headless", "--no-sandbox", "--disable-gpu"]
+        command += [f"--user-data-dir={profile}", "--no-pdf-header-footer"]
+        command += [f"--print-to-pdf={target}", page.resolve().as_uri()]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PRINTING)
     if done.returncode or not target.exists() or not target.stat().st_size:
         raise NotebookFailed(f"{browser} could not print {page}: {done.stderr.strip()[-200:]}")

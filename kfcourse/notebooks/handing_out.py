@@ -46,11 +46,12 @@ def hand_out(
         variant.plain("the exercises")  # told once, not for each set
     if variants_file and (everything or not names):
         _say_left_out(variants_file, bool(variants))
-    options = {"variants_file": variants_file, "masters": masters, "with_pdf": with_pdf}
+    options: dict[str, Any] = {"with_pdf": with_pdf, "masters": masters and masters.absolute()}
+    options["variants_file"] = variants_file and variants_file.absolute()
     if students:
         work = _for_students(kind, students, [*variants], wanted, out, options)
     else:
-        work = plan(kind, out, [*variants], wanted, **options)
+        work = plan(kind, out.absolute(), [*variants], wanted, **options)
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     failed = _show(run_all(work, make, workers, kind), work)
@@ -116,7 +117,7 @@ def _for_students(
         Job(
             letter,
             student.variant,
-            out / student.folder,
+            out.absolute() / student.folder,
             kind,
             student=f"{student.name}, {student.group}",
             **options,

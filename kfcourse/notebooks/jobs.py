@@ -40,7 +40,8 @@ class Job:
     ----------
     letter, variant : str
     folder : Path
-        Where the files go.
+        Where the files go; absolute, as the others: a worker process may have another working
+        directory.
     kind : {"exercises", "nbgrader", "solutions"}
     variants_file : Path or None
     masters : Path or None
@@ -58,12 +59,6 @@ class Job:
     masters: Path | None = None
     with_pdf: bool = False
     student: str = ""
-
-    def __post_init__(self) -> None:
-        # a worker process may have another working directory
-        for path in ("folder", "variants_file", "masters"):
-            if getattr(self, path) is not None:
-                object.__setattr__(self, path, getattr(self, path).absolute())
 
     @property
     def name(self) -> str:

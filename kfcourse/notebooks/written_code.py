@@ -5,61 +5,16 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from kfcourse.checks import Exercise
-from kfcourse.laws import Array
 from kfcourse.symbolic.sides import Side, plain
 
 COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
-
-
-DEVIATIONS = np.linspace(0.05, 1, 20)  # of the state, as the picture of set a has them
-SAME = 1e-9  # share of a variance that rounding explains
-
-
-class Apart(NamedTuple):
-    """An entry of a covariance, and what the linearised one misses of it over `DEVIATIONS`, as a
-    share of the exact variances.
-
-    label : LaTeX;  equation : in words;  functions : names of the exact and the linearised one
-    """
-
-    label: str
-    equation: str
-    functions: str
-    colour: str
-    row: int
-    column: int
-    missing: Array
-
-    @property
-    def differs(self) -> bool:
-        return bool(np.abs(self.missing).max() > SAME)
-
-    @property
-    def says(self) -> str:
-        """The curve in a sentence."""
-        half, twentieth = (_percent(self.missing[place]) for place in (9, 19))
-        large = DEVIATIONS[np.abs(self.missing) > 0.1]
-        tenth = (
-            f"it is more than a tenth from {large[0]:.2g} on"
-            if large.size
-            else "nowhere in the picture is it a tenth"
-        )
-        return (
-            f"The tangent's {self.label} is {half} at a standard deviation of 0.5, and {twentieth} "
-            f"at 1; {tenth}."
-        )
-
-
-def _percent(share: float) -> str:
-    size = f"{100 * abs(share):.0f}" if abs(share) > 0.1 else f"{100 * abs(share):.1g}"
-    return f"{size} % too {'small' if share > 0 else 'large'}"
 
 
 class Solutions:
@@ -97,45 +52,6 @@ class Solutions:
                 '"""',
             ]
         )
-
-    def apart(self) -> list[Apart]:
-        """Where the linearised covariances differ most from the exact ones, at the prior mean: of
-        Theta and of F."""
-        model, known = self.exercise.model, (5,) if self.exercise.model.timed else ()
-        cov = DEVIATIONS[:, None, None] ** 2 * np.eye(model.n)
-        mean = np.tile(model.prior.mean, (len(cov), 1))
-        curves = []
-        for place, (name, equation, functions, colour) in enumerate(
-            (
-                (r"\Theta", "the state equation", "object_gaussian, object_linearised", "#0072B2"),
-                ("F", "the meter equation", "meter_gaussian, meter_linearised", "#D55E00"),
-            )
-        ):
-            exact, tangent = (
-                self.exercise.functions(kind, *known)[1 - place](mean, cov)[-1]
-                for kind in ("gaussian", "linearised")
-            )
-            scale = np.sqrt(np.diagonal(exact, axis1=1, axis2=2))
-            missing = (exact - tangent) / (scale[:, :, None] * scale[:, None, :])
-            most = np.abs(missing).max(axis=0)
-            # a covariance is taken only if no variance differs
-            variances = np.diag(np.diagonal(most))
-            row, column = np.unravel_index(
-                (variances if variances.max() > SAME else most).argmax(), most.shape
-            )
-            index = "" if exact.shape[1:] == (1, 1) else f"_{{{row + 1}{column + 1}}}"
-            curves.append(
-                Apart(
-                    f"${name}{index}$",
-                    equation,
-                    functions,
-                    colour,
-                    int(row),
-                    int(column),
-                    missing[:, row, column],
-                )
-            )
-        return curves
 
     def meter_is_silent(self) -> bool:
         """Whether the meter's noise, at the start and at the prior mean, leaves a combination of

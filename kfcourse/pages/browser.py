@@ -17,7 +17,6 @@ and a filter that runs in the browser is the one that the book derives.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import product
@@ -78,15 +77,11 @@ def filter_source(name: str, structures: Structures) -> str:
     step = _loop("step", running, kept, given, constants, coefficients)
     if not coefficients:
         return f"{{ design: null, step: {step.strip()} }}"
-    return (
-        f"{{ design: {_design(rules, kept, known, constants, coefficients)}, step: "
-        f"{step.strip()} }}"
-    )
+    return f"{{ design: {_design(rules, known, constants, coefficients)}, step: {step.strip()} }}"
 
 
 def _design(
     rules: Sequence[Rule],
-    kept: Sequence[sp.Symbol],
     known: Mapping[sp.Symbol, str],
     constants: Sequence[sp.Symbol],
     coefficients: Mapping[sp.Symbol, str],
@@ -95,18 +90,16 @@ def _design(
     ready = [scalar(letter) for letter in _GIVEN]
     lines, group = list[str](), list[Rule]()
     arrays = {array_name(symbol): symbol for symbol in ready}
-    later = list(rules)
 
     def close() -> None:
         if group:
-            wanted = _used_later(group, later, known, kept)
+            wanted = [left for left, _ in group]
             loop = _loop(f"loop{len(lines)}", group, wanted, ready, constants, coefficients)
             lines.append(f"({loop.strip()})(n, v, c, a);")
             ready.extend(left for left, _ in group if array_name(left) not in arrays)
             group.clear()
 
     for left, right in rules:
-        later.pop(0)
         if left not in coefficients:
             group.append((left, right))
             continue
@@ -116,22 +109,6 @@ def _design(
         lines.append(f"c.{coefficients[left]} = {javascript.expression(right, names)};")
     close()
     return "function (n, v, c, a) {\n" + "\n".join(lines) + "\n}"
-
-
-def _used_later(
-    group: Sequence[Rule],
-    later: Sequence[Rule],
-    known: Mapping[sp.Symbol, str],
-    kept: Sequence[sp.Symbol],
-) -> list[sp.Symbol]:
-    """Of a group's letters those that the later rules need, also through means and covariances, and
-    those that are kept."""
-    used = set(kept)
-    for _, right in later:
-        texts = " ".join(known[letter] for letter in right.free_symbols & known.keys())
-        names = set(re.findall(r"a\.(\w+)", texts))
-        used |= right.free_symbols | {left for left, _ in group if array_name(left) in names}
-    return [left for left, _ in group if left in used]
 
 
 def _loop(

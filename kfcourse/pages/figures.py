@@ -21,6 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from matplotlib_inline.backend_inline import set_matplotlib_formats
+from scipy.optimize import isotonic_regression
 
 from kfcourse.symbolic.writing import by_thousands
 
@@ -109,9 +110,7 @@ def label_ends(ax: Axes, least: float = 0.07, lowest: float = -np.inf, **text: A
             ends.append((line, *points[-1]))
     ax.autoscale_view()  # limits are final
     corner = ax.transAxes.inverted()
-    points = np.array(
-        [corner.transform(ax.transData.transform((x, y))) for _, x, y in ends]
-    ).reshape(-1, 2)
+    points = np.array([corner.transform(ax.transData.transform((x, y))) for _, x, y in ends])
     floor = (
         corner.transform(ax.transData.transform((0, lowest)))[1] if np.isfinite(lowest) else -np.inf
     )
@@ -153,15 +152,4 @@ def _apart(heights: np.ndarray, least: float, floor: float) -> np.ndarray:
     """Ascending heights moved as little as it takes to be `least` apart, the first not below
     `floor`."""
     steps = least * np.arange(len(heights))
-    free = heights - steps  # must not descend: pool neighbours that do
-    pools: list[tuple[float, int]] = []
-    for value in free:
-        pools.append((float(value), 1))
-        while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
-            (mean, n), (other, m) = pools[-2], pools[-1]
-            pools[-2:] = [((mean * n + other * m) / (n + m), n + m)]
-    return (
-        np.maximum(np.concatenate([np.full(n, mean) for mean, n in pools]), floor) + steps
-        if pools
-        else free
-    )
+    return np.maximum(isotonic_regression(heights - steps).x, floor) + steps

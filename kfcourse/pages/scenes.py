@@ -98,16 +98,7 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
         c x + e v, g x + f w, of which the records are.
     x, y : ndarray (steps, runs)
         States and measurements.
-
-    Raises
-    ------
-    ValueError
-        Parameters with other names.
     """
-    if set(model.parameters) != set("cegf"):
-        raise ValueError(
-            f"expected a model with the parameters c, e, g, f, got {', '.join(model.parameters)}"
-        )
     steps, runs = x.shape
     state, z, p, measured, h, F = sp.symbols("x z p y h F")
     parts = [

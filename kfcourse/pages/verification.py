@@ -50,7 +50,6 @@ def verified(
     *equations: Equation,
     where: Mapping[Any, Any] | None = None,
     digits: int | None = None,
-    at: Sequence[Mapping[Any, float]] | None = None,
     label: str | None = None,
     how: str | None = None,
     names: Mapping[Any, str] | None = None,
@@ -62,17 +61,15 @@ def verified(
     *equations : (left, right, ...)
         Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is
         printed and not checked, so at least two others are needed then.  Where all sides print
-        alike a string before them must say what they are.  `sympy.Eq` is taken too, unless SymPy
-        has already made it true or false.  A function that returns the equations, `lambda: [(p,
-        Psi - K*S*Psi)]`, has its terms and factors printed in the order in which they stand there.
+        alike a string before them must say what they are.  A function that returns the equations,
+        `lambda: [(p, Psi - K*S*Psi)]`, has its terms and factors printed in the order in which
+        they stand there.
     where : mapping of symbols to expressions
         What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference
         is taken, as often as it takes.
     digits : int, optional
-        Compare numbers instead, at the points `at`, to so many digits: for integrals and sums that
-        SymPy does not take.
-    at : sequence of mappings of symbols to numbers, optional
-        Three points are drawn if there are none, positive for positive symbols.
+        Compare numbers instead, at three points that are drawn, positive for positive symbols, to
+        so many digits: for integrals and sums that SymPy does not take.
     label : str, optional
         The equations get a number, and {eq}`label` refers to it.
     how : str, optional
@@ -104,12 +101,8 @@ def verified(
             if digits is None:
                 _must_vanish(left, right, where or {})
             else:
-                _must_agree(left, right, where or {}, digits, at)
-    evidence = (
-        "identity, by SymPy"
-        if digits is None
-        else f"to {digits} digits, at {3 if at is None else len(at)} points"
-    )
+                _must_agree(left, right, where or {}, digits)
+    evidence = "identity, by SymPy" if digits is None else f"to {digits} digits, at 3 points"
     mark = f"{evidence}; {how}" if how else evidence
     return _shown(given, names, f'verified">✓ {mark}', label=label, how=mark, equations=len(given))
 
@@ -196,7 +189,7 @@ def _holds(sentence: str) -> Shown:
 
 def _given(equations: Sequence[Any]) -> list[tuple[Side, ...]]:
     if not callable(equations[0]):
-        return [_sides(equation) for equation in equations]
+        return [(each,) if isinstance(each, str) else tuple(each) for each in equations]
     with sp.evaluate(False):
         return [tuple(map(_as_written, sides)) for sides in equations[0]()]
 
@@ -213,19 +206,6 @@ def _as_written(side: Side) -> Side:
     )
 
 
-def _sides(equation: Any) -> tuple[Side, ...]:
-    if isinstance(equation, sp.logic.boolalg.BooleanAtom | bool):
-        raise Unverified(
-            f"SymPy has already made this equation {equation}: nothing is left to print.  Give "
-            f"its sides: verified((left, right))"
-        )
-    if isinstance(equation, sp.Equality):
-        return equation.lhs, equation.rhs
-    if isinstance(equation, str):
-        return (equation,)
-    return tuple(equation)
-
-
 def _must_vanish(left: Any, right: Any, where: Mapping[Any, Any]) -> None:
     rest = difference(left, right, where)
     if any(entry != 0 for entry in rest):
@@ -235,25 +215,16 @@ def _must_vanish(left: Any, right: Any, where: Mapping[Any, Any]) -> None:
         )
 
 
-def _must_agree(
-    left: Any,
-    right: Any,
-    where: Mapping[Any, Any],
-    digits: int,
-    at: Sequence[Mapping[Any, float]] | None,
-) -> None:
+def _must_agree(left: Any, right: Any, where: Mapping[Any, Any], digits: int) -> None:
     left, right = _substituted(left, where), _substituted(right, where)
     unit = sp.Float(10) ** -digits
     free = sorted((left.free_symbols | right.free_symbols), key=str)
-    for point in _points(free) if at is None else at:
-        first, other = (sp.N(side.subs(point).doit(), digits + 15) for side in (left, right))
-        if not (first.is_number and other.is_number):
-            raise ValueError(
-                f"at {point} no number is left but {first} and {other}: `at` gives every symbol a "
-                f"value"
-            )
-        if not abs(first - other) <= unit * max(abs(first), abs(other), unit):
-            numbers = f"the left side is {sp.N(first, digits)}, the right {sp.N(other, digits)}"
+    for point in _points(free):
+        first, second = (sp.N(side.subs(point).doit(), digits + 15) for side in (left, right))
+        if not (first.is_number and second.is_number):
+            raise ValueError(f"at {point} no number is left but {first} and {second}")
+        if not abs(first - second) <= unit * max(abs(first), abs(second), unit):
+            numbers = f"the left side is {sp.N(first, digits)}, the right {sp.N(second, digits)}"
             raise Unverified(f"at {point} {numbers}\n  left:  {left}\n  right: {right}")
 
 

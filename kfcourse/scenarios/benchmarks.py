@@ -41,7 +41,6 @@ MODELS = tomllib.loads((DATA / "benchmarks.toml").read_text(encoding="utf-8"))
 _PUBLISHED = MODELS["published"]
 PENDULUM_ERRORS: dict[str, float] = _PUBLISHED["pendulum_errors"]
 PENDULUM_SMOOTHED: dict[str, float] = _PUBLISHED["pendulum_smoothed"]
-PENDULUM_PARTICLES: dict[str, float] = _PUBLISHED["pendulum_particles"]
 CAR_ERRORS: dict[str, float] = _PUBLISHED["car_errors"]
 GROWTH_ERRORS: dict[str, float] = _PUBLISHED["growth_errors"]
 GROWTH_ELSEWHERE: dict[str, float] = _PUBLISHED["growth_elsewhere"]

@@ -222,12 +222,15 @@ class Reader:
     def number(self, node: ast.Constant) -> sp.Expr:
         if isinstance(node.value, bool) or not isinstance(node.value, int | float):
             raise self.fail(node, f"{node.value!r} is not a real number")
-        if node.value and not 1e-100 < abs(node.value) < 1e100:
+        written = ast.get_source_segment(self.formula[self.offset :], node) or ""
+        # as written, since 1e-400 is 0 as a float
+        value = sp.Rational(node.value if isinstance(node.value, int) else written.replace("_", ""))
+        if value and not 1e-100 < abs(value) < 10**100:
             raise self.fail(
                 node,
                 "the number is too large or too small (1e-100 to 1e100 are read): change the units",
             )
-        return sp.Rational(str(node.value))
+        return value
 
     def name(self, node: ast.Name) -> sp.Expr:
         known = self.symbols | CONSTANTS

@@ -4,6 +4,7 @@ refused in words."""
 from functools import cache
 
 import pytest
+from weekly import weekly
 
 from kfcourse.checks import derived, exercise
 from kfcourse.derivations import check_text
@@ -34,7 +35,7 @@ def told(*lines):
     return task.check("a7", lambda: "\n = ".join(lines))
 
 
-@pytest.mark.parametrize("variant", load_variants())
+@pytest.mark.parametrize("variant", weekly(zip(load_variants())))
 def test_every_variant_has_a_right_derivation(variant):
     task = exercise("a", variant)
     assert task.derivation.model == task.model
@@ -48,30 +49,27 @@ def test_where_derivations_are_not_checked_the_course_s_model_is_asked_for(table
     assert task.check("a7", lambda: task.derivation.text).passed
 
 
+MIDDLE = "g^2*d + f^2*M[x^4]"
+SLIP = "g^2*d + 3*f^2*d^2"
+
+
 def test_line_term_and_rule_are_named_and_what_stands_on_top_is_right():
-    result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2", "d*(g^2 + 3*f^2*d)")
+    result = told(BEGIN, MIDDLE, SLIP, "d*(g^2 + 3*f^2*d)")
     assert (result.status, result.diagnosis, result.share) == ("wrong", ("moment",), 0.75)
-    named = (
-        "line 3, `g^2*d + 3*f^2*d^2`",
+    for words in (
+        f"line 3, `{SLIP}`",
         "`3*f^2*d^2` is not right",
         "Moments of a normal law",
         "right on top of it (1 step)",
-    )
-    assert all(words in result.message for words in named)
-    assert "3 of 4 steps are right" in result.message and "\n" not in result.message
-
-
-def test_a_second_slip_is_named_too_and_costs_another_step():
-    result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2", "d*(g^2 - 3*f^2*d)")
-    assert "slip of its own in line 4" in result.message
-    assert result.share == 0.5
-
-
-def test_the_hint_does_not_hold_the_right_line():
-    result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2")
-    assert not any(
-        part in result.message.replace(" ", "") for part in ("6*m^2*d", "m^4", "6*d*m^2")
-    )
+        "3 of 4 steps are right",
+    ):
+        assert words in result.message
+    # no right line
+    for part in ("6*m^2*d", "m^4", "6*d*m^2", "\n"):
+        assert part not in result.message.replace(" ", "")
+    # a second slip is named too, and costs another step
+    result = told(BEGIN, MIDDLE, SLIP, "d*(g^2 - 3*f^2*d)")
+    assert "slip of its own in line 4" in result.message and result.share == 0.5
 
 
 def test_an_end_that_is_not_what_was_asked_for_does_not_pass(monkeypatch):
@@ -92,20 +90,18 @@ def test_an_end_that_is_not_what_was_asked_for_does_not_pass(monkeypatch):
 
 
 def test_the_same_again_gets_the_advice():
-    task = opened()
-    task.past.given.clear()
-    lines = lambda: f"{BEGIN}\n = g^2*d"  # noqa: E731
-    assert "cross out" not in task.check("a7", lines).message
-    assert "cross out" in task.check("a7", lines).message
+    opened().past.given.clear()
+    messages = [opened().check("a7", lambda: f"{BEGIN}\n = g^2*d").message for _ in range(2)]
+    assert ["cross out" in message for message in messages] == [False, True]
 
 
 def test_a_step_can_be_split_up_at_will_and_earns_no_more():
     """Rewriting one line again and again does not hide that the next is wrong, nor that there is no
     end."""
     padding = [f"M[(y - h)^2] + {k} - {k}" for k in range(9)]
-    assert told(BEGIN, *padding, "g^2*d").share == 0.8
-    assert told(BEGIN, *padding).share == 0.4
-    assert told(BEGIN, *["M[(y - h)^2]"] * 9, "g^2*d").share == 0.5
+    same = ["M[(y - h)^2]"] * 9
+    for lines, share in (((*padding, "g^2*d"), 0.8), (padding, 0.4), ((*same, "g^2*d"), 0.5)):
+        assert told(BEGIN, *lines).share == share
     nothing = told("F = F", "F + 0", "2*F/2")
     assert (nothing.diagnosis, nothing.share) == (("open-end",), 0.0)
     assert nothing.message.startswith("nothing is derived yet. The last line still has F in it")
@@ -126,7 +122,7 @@ def test_a_step_can_be_split_up_at_will_and_earns_no_more():
         (
             "unreadable",
             "cannot be read at column",
-            [BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2*"],
+            [BEGIN, MIDDLE, "g^2*d + 3*f^2*d^2*"],
         ),
     ],
 )
@@ -137,7 +133,7 @@ def test_a_right_end_is_not_all(kind, words, lines):
 
 
 def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
-    assert told("h = M[y]", "g*M[x]", f"g*m\n{BEGIN}", "g^2*d + f^2*M[x^4]", END).passed
+    assert told("h = M[y]", "g*M[x]", f"g*m\n{BEGIN}", MIDDLE, END).passed
     assert told(
         f"letters q\nq = M[x^4]\n = m^4 + 6*m^2*d + 3*d^2\n{BEGIN}", "g^2*d + f^2*q", END
     ).passed
@@ -151,18 +147,19 @@ def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
         )
 
 
-HOSTILE = {
-    "call": "F = __import__('os').system('true')",
-    "deep": "F = " + "(" * 900 + "x" + ")" * 900,
-    "many": "F = x\n" + " = x\n" * 100,
-    "no name": " = 5",
-    "twice": f"{BEGIN}\n{BEGIN}",
-    "division": "F = 1/(x - x)",
-}
-
-
-@pytest.mark.parametrize("name", HOSTILE)
-def test_what_cannot_be_read_is_refused_in_words(name):
-    result = opened().check("a7", lambda: HOSTILE[name])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "F = __import__('os').system('true')",
+        "F = " + "(" * 900 + "x" + ")" * 900,
+        "F = x\n" + " = x\n" * 100,
+        " = 5",
+        f"{BEGIN}\n{BEGIN}",
+        "F = 1/(x - x)",
+    ],
+    ids=lambda text: text[:20],
+)
+def test_what_cannot_be_read_is_refused_in_words(text):
+    result = opened().check("a7", lambda: text)
     assert (result.status, result.trouble) == ("unusable", "")
     assert 20 < len(result.message) < 600 and "\n" not in result.message

@@ -1,13 +1,14 @@
 """Nothing that a student hands in stops a check, and what comes of nonsense is a sentence that
 helps."""
 
-import datetime
 import math
+from itertools import product
 
 import numpy as np
 import pytest
 import sympy as sp
 from tiny import asks, outcome, p, raises, z
+from weekly import weekly
 
 from kfcourse.checks.question import catalogue
 
@@ -56,49 +57,16 @@ def ruins_its_arguments(*arguments):
     return arguments[0]
 
 
-NOT_FUNCTIONS = {
-    "None": None,
-    "number": 3,
-    "text": "z",
-    "array": np.ones(3),
-    "formula": z,
-    "object": Evil(),
-}
-RETURNED = {
-    "text": "z",
-    "nothing": None,
-    "nan": math.nan,
-    "inf": math.inf,
-    "complex": 1j,
-    "true": True,
-    "list": [1, 2],
-    "empty": [],
-    "ragged": [[1], [1, 2]],
-    "objects": np.array([None, "a"], dtype=object),
-    "strings": np.array(["a"]),
-    "dates": np.array(["2020-01-01"], "datetime64[D]"),
-    "booleans": np.array([True, False]),
-    "shape": np.zeros((3, 4, 5)),
-    "huge": 10**400,
-    "set": {1, 2},
-    "dict": {"z": 1},
-    "function": lambda: 1,
-    "class": int,
-    "object": Evil(),
-    "pair": (Evil(), Evil()),
-    "sympy nan": sp.nan,
-    "sympy inf": (sp.oo, sp.zoo),
-    "imaginary": (sp.I, sp.I),
-    "relation": (z > 1, z > 1),
-    "unknown function": (sp.Function("u")(z), z),
-    "matrix symbol": (sp.MatrixSymbol("A", 2, 2), sp.MatrixSymbol("A", 2, 2)),
-    "lambda": (sp.Lambda(z, z), z),
-    "not commuting": (sp.Symbol("q", commutative=False), z),
-    "tower": (sp.exp(sp.exp(sp.exp(1000 * z))), z),
-    "power": (z ** (10**9), (z**999 + 1) ** 999),
-    "order": (sp.O(z), z),
-    "matrix": sp.Matrix([[z, z, z]]),
-}
+u, q, A = sp.Function("u"), sp.Symbol("q", commutative=False), sp.MatrixSymbol("A", 2, 2)
+RETURNED = [
+    *("z", None, True, [1, 2], [], [[1], [1, 2]], 10**400, 1j, {1, 2}, {"z": 1}, lambda: 1, int),
+    *(np.array([None, "a"], dtype=object), np.array(["a"]), np.array([True, False])),
+    *(np.array(["2020-01-01"], "datetime64[D]"), np.zeros((3, 4, 5)), Evil(), (Evil(), Evil())),
+    *((sp.I, sp.I), (z > 1, z > 1), (u(z), z), (A, A), (sp.Lambda(z, z), z), (q, z), (sp.O(z), z)),
+    *((sp.exp(sp.exp(sp.exp(1000 * z))), z), (z ** (10**9), (z**999 + 1) ** 999)),
+    sp.Matrix([[z, z, z]]),
+]
+NOT_FINITE = [math.nan, math.inf, sp.nan, (sp.oo, sp.zoo)]
 CALLED = {
     "no arguments": lambda: 1,
     "too many": lambda a, b, c, d, e, f, g, h: a,
@@ -111,13 +79,17 @@ CALLED = {
     "math": lambda first, *_: math.sin(first),
     "index": lambda *arguments: arguments[9],
     "attribute": lambda first, *_: first.nothing,
-    "exits": raises(SystemExit(1)),
-    "closes": raises(GeneratorExit()),
-    "stops": raises(StopIteration()),
-    "memory": raises(MemoryError()),
-    "own": raises(EvilError()),
-    "lines": raises(ValueError("one\ntwo")),
-} | {f"returns {name}": lambda *_, value=value: value for name, value in RETURNED.items()}
+} | {
+    f"raises {type(error).__name__}": raises(error)
+    for error in (
+        *(SystemExit(1), GeneratorExit(), StopIteration(), MemoryError(), EvilError()),
+        ValueError("two\nlines"),
+    )
+}
+CALLED |= {
+    f"returns {number}": lambda *_, value=value: value
+    for number, value in enumerate([*RETURNED, *NOT_FINITE])
+}
 
 VECTOR, MATRIX = sp.ImmutableMatrix([z, p]), sp.ImmutableMatrix([[p, z], [z, p + 1]])
 RNG = np.random.default_rng(5)
@@ -129,7 +101,7 @@ def filtered(y, mean, measure, predict):
     return np.array([predict(mean + 0.5 * (one - measure(mean))) for one in y])
 
 
-# A question of each kind, with a known mistake: formulas, matrices of formulas, an array with two
+# A question of each kind, one with a known mistake: formulas, matrices of formulas, an array with two
 # hidden inputs, several arrays.
 KINDS = {
     "formulas": asks(
@@ -143,35 +115,16 @@ KINDS = {
     "matrices": asks(
         lambda z, p: (2 * z, 4 * p),
         [(VECTOR, MATRIX)],
-        catalogue([("once", "a factor enters once", lambda z, p: (2 * z, 2 * p))]),
-        ("tau", "Theta"),
+        parts=("tau", "Theta"),
     ),
     "array": asks(
         filtered,
         [(values, np.ones(2), lambda x: 2 * x, lambda x: x + 1) for values in (RUN, RUN[::-1])],
-        catalogue(
-            [
-                (
-                    "not-predicted",
-                    "not predicted",
-                    lambda y, mean, measure, predict: filtered(y, mean, measure, lambda x: x),
-                )
-            ]
-        ),
     ),
     "arrays": asks(
         lambda x, z: (((x - z) ** 2).mean(axis=1), (x - z).std(axis=1)),
         [(RNG.normal(size=(5, 8)), RNG.normal(size=(5, 8)))],
-        catalogue(
-            [
-                (
-                    "absolute",
-                    "absolute values",
-                    lambda x, z: (np.abs(x - z).mean(axis=1), (x - z).std(axis=1)),
-                )
-            ]
-        ),
-        ("value", "error"),
+        parts=("value", "error"),
     ),
 }
 
@@ -180,29 +133,14 @@ def judged(question, answer):
     return outcome(question, answer, seconds=5.0)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", NOT_FUNCTIONS)
-def test_what_is_no_function_is_told(kind, name):
-    result = judged(KINDS[kind], NOT_FUNCTIONS[name])
+@pytest.mark.parametrize("value", [None, 3, "z", np.ones(3), z, Evil()], ids=type)
+def test_what_is_no_function_is_told(value):
+    result = judged(KINDS["formulas"], value)
     assert result.status == "unusable"
     assert result.message.startswith("expected a function, got ")
 
 
-# Each in one kind of question, in another one every week; in all of them every night.
-WEEK = datetime.date.today().toordinal() // 7
-CASES = [
-    pytest.param(
-        kind,
-        name,
-        id=f"{name}-{kind}",
-        marks=[] if (WEEK + number - place) % len(KINDS) == 0 else pytest.mark.slow,
-    )
-    for number, name in enumerate(CALLED)
-    for place, kind in enumerate(KINDS)
-]
-
-
-@pytest.mark.parametrize(("kind", "name"), CASES)
+@pytest.mark.parametrize(("kind", "name"), weekly(product(KINDS, CALLED)))
 @pytest.mark.filterwarnings("ignore::sympy.utilities.exceptions.SymPyDeprecationWarning")
 def test_nonsense_never_stops_a_check(kind, name):
     result = judged(KINDS[kind], CALLED[name])
@@ -211,22 +149,23 @@ def test_nonsense_never_stops_a_check(kind, name):
     assert "\n" not in result.message
 
 
-@pytest.mark.parametrize("name", ["nan", "sympy nan", "sympy inf", "inf"])
-def test_what_is_not_finite_is_told(name):
-    value = RETURNED[name]
-    value = value if isinstance(value, tuple) else (value, value)
-    assert "NaN or infinity" in judged(KINDS["formulas"], lambda z, p: value).message
-    arrays = lambda x, z: (np.full(len(x), math.nan),) * 2  # noqa: E731
-    assert "NaN or infinity" in judged(KINDS["arrays"], arrays).message
-
-
-def test_messages_help():
-    assert "is `return` missing" in judged(KINDS["formulas"], lambda z, p: None).message
-    assert "expected 2 results" in judged(KINDS["formulas"], lambda z, p: z).message
-    assert "result 2 of 2" in judged(KINDS["formulas"], lambda z, p: (z, "p")).message
-    assert "2 rows and 1 columns" in judged(KINDS["matrices"], lambda z, p: (z.T, p)).message
-    assert "(4, 3, 2)" in judged(KINDS["array"], lambda *_: np.zeros(3)).message
-    assert "sp.sin" in judged(KINDS["formulas"], lambda z, p: (math.sin(z), p)).message
-    assert "sp.sin" in judged(KINDS["formulas"], lambda z, p: (np.sin(z), p)).message
-    message = judged(KINDS["formulas"], lambda z, p: (1 / 0, p)).message
-    assert "ZeroDivisionError" in message and "in line" in message
+@pytest.mark.parametrize(
+    ("kind", "answer", "words"),
+    [
+        *(
+            ("formulas", lambda z, p, v=v: v if isinstance(v, tuple) else (v, v), "NaN or infinity")
+            for v in NOT_FINITE
+        ),
+        ("arrays", lambda x, z: (np.full(len(x), math.nan),) * 2, "NaN or infinity"),
+        ("formulas", lambda z, p: None, "is `return` missing"),
+        ("formulas", lambda z, p: z, "expected 2 results"),
+        ("formulas", lambda z, p: (z, "p"), "result 2 of 2"),
+        ("matrices", lambda z, p: (z.T, p), "2 rows and 1 columns"),
+        ("array", lambda *_: np.zeros(3), "(4, 3, 2)"),
+        ("formulas", lambda z, p: (math.sin(z), p), "sp.sin"),
+        ("formulas", lambda z, p: (np.sin(z), p), "sp.sin"),
+        ("formulas", lambda z, p: (1 / 0, p), "ZeroDivisionError: division by zero, in line"),
+    ],
+)
+def test_messages_help(kind, answer, words):
+    assert words in judged(KINDS[kind], answer).message

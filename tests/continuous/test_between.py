@@ -4,9 +4,9 @@ published figures."""
 import dataclasses
 import json
 from pathlib import Path
-from time import process_time
 
 import numpy as np
+import oracles
 import pytest
 import scipy.linalg
 import sympy as sp
@@ -27,9 +27,8 @@ from kfcourse import (
 from kfcourse.cli import main
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
-from kfcourse.filters import aof, duof, fos, kalman_filter, particle
-from kfcourse.lab import find_variant
-from kfcourse.lab.variants import VariantError, summary
+from kfcourse.filters import aof, duof, fos, kalman_filter
+from kfcourse.lab.variants import VariantError, read_variant, summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.records import estimate, read_measurements
@@ -54,6 +53,7 @@ H = np.array([[1.0, 0.3], [0.2, -1.0]])
 R = np.array([[0.3, 0.1], [0.1, 0.4]])
 PRIOR = np.array([0.5, -0.4]), np.array([[0.8, 0.2], [0.2, 0.6]])
 FORCE = [0.3, -1.0, 0.7, 2.0, 0.1, 0.0]
+CUBIC = " - 1e-14*x1**3"  # so small that it is none, but the equations are integrated
 
 
 def oscillator(extra="", **changes):
@@ -94,75 +94,40 @@ def record():
     return y
 
 
-def kalman(y):
-    """The textbook's filter of one record: predictions, estimates, covariances, log densities."""
-    m, P = PRIOR
-    rows = []
-    for (Phi, shift, Q), value in zip(transitions(), y, strict=True):
-        seen = ~np.isnan(value)
-        before, S = (m, P), H[seen] @ P @ H[seen].T + R[np.ix_(seen, seen)]
-        nu, density = value[seen] - H[seen] @ m, 0.0
-        if seen.any():
-            K = P @ H[seen].T @ np.linalg.inv(S)
-            density = -0.5 * (nu @ np.linalg.solve(S, nu) + np.log(np.linalg.det(2 * np.pi * S)))
-            m, P = m + K @ nu, P - K @ S @ K.T
-        rows.append((*before, m, P, density))
-        m, P = Phi @ m + shift, Phi @ P @ Phi.T + Q
-    return [np.array(column) for column in zip(*rows, strict=True)]
+STEPS = [(Phi, shift, Q, H, np.zeros(2), R) for Phi, shift, Q in transitions()]
 
 
 @pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
 def test_a_linear_model_has_kalmans_filter(structure):
-    chosen, y = aof(structure(oscillator())), record()
-    before, after, density = predictions(chosen, y), run(chosen, y), likelihood(chosen, y)
+    filter_, y = aof(structure(oscillator())), record()
+    ours = predictions(filter_, y), run(filter_, y)
     for i in range(4):
-        mean, cov, z, p, terms = kalman(y[:, i])
-        for got, wanted in (
-            (before.mean[:, i], mean),
-            (before.cov[:, i], cov),
-            (after.mean[:, i], z),
-            (after.cov[:, i], p),
-            (density[:, i], terms),
-        ):
-            np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-11)  # Simpson's rule: 1e-13
+        for k, laws in enumerate(oracles.kalman_loop(STEPS, PRIOR, y[:, i])):
+            for law, wanted in zip(ours, laws, strict=True):
+                # Simpson's rule: 1e-13
+                np.testing.assert_allclose(law.mean[k, i], wanted[0], rtol=0, atol=1e-11)
+                np.testing.assert_allclose(law.cov[k, i], wanted[1], rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
 def test_integrated_the_linear_model_is_the_same_but_for_the_accuracy(structure):
     y = record()
-    # (1 + t - t)-like changes would be simplified away; so small a cubic is none, but the equations
-    # are integrated
     for accuracy in (1e-5, 1e-9):
-        chosen = aof(structure(oscillator(" - 1e-14*x1**3", accuracy=accuracy)))
-        error = run(chosen, y).mean - run(aof(linearised(oscillator())), y).mean
+        filter_ = aof(structure(oscillator(CUBIC, accuracy=accuracy)))
+        error = run(filter_, y).mean - run(aof(linearised(oscillator())), y).mean
         assert np.abs(error).max() < 100 * accuracy  # some tens of steps
     assert np.abs(error).max() < 1e-8
 
 
-def test_the_smoother_is_the_regression_on_the_whole_record():
-    y, chosen = record()[:, :1], aof(gaussian(oscillator()))
-    steps = list(transitions())
-    mean, blocks = [PRIOR[0]], [[PRIOR[1]]]
-    for Phi, shift, Q in steps[:-1]:
-        mean.append(Phi @ mean[-1] + shift)
-        last = blocks[-1]
-        blocks.append([Phi @ block for block in last] + [Phi @ last[-1] @ Phi.T + Q])
-    joint = np.zeros((6, 2, 6, 2))
-    for i, row in enumerate(blocks):
-        for j, block in enumerate(row):
-            joint[i, :, j], joint[j, :, i] = block, block.T
-    joint, mean = joint.reshape(12, 12), np.concatenate(mean)
-    flat = y.ravel()
-    seen = ~np.isnan(flat)
-    G = scipy.linalg.block_diag(*[H] * 6)[seen]
-    S = G @ joint @ G.T + scipy.linalg.block_diag(*[R] * 6)[np.ix_(seen, seen)]
-    K = joint @ G.T @ np.linalg.inv(S)
-    law = smooth(chosen, y)
-    np.testing.assert_allclose(law.mean.ravel(), mean + K @ (flat[seen] - G @ mean), atol=1e-10)
-    left = (joint - K @ S @ K.T).reshape(6, 2, 6, 2)
-    np.testing.assert_allclose(law.cov[:, 0], [left[i, :, i] for i in range(6)], atol=1e-10)
-    law = smooth(aof(gaussian(oscillator(" - 1e-14*x1**3", accuracy=1e-9))), y)
-    np.testing.assert_allclose(law.cov[:, 0], [left[i, :, i] for i in range(6)], atol=1e-7)
+@pytest.mark.parametrize(("extra", "allowed"), [("", 1e-10), (CUBIC, 1e-7)])
+def test_smoother_and_likelihood_are_the_regression_on_the_whole_record(extra, allowed):
+    y, filter_ = record(), aof(gaussian(oscillator(extra, accuracy=1e-9)))
+    law, density = smooth(filter_, y), likelihood(filter_, y).sum(axis=0)
+    for i in range(4):
+        mean, cov, log = oracles.joint_posterior(STEPS, PRIOR, y[:, i])
+        np.testing.assert_allclose(law.mean[:, i], mean, atol=allowed)
+        np.testing.assert_allclose(law.cov[:, i], cov, atol=allowed)
+        assert density[i] == pytest.approx(log, abs=10 * allowed)
 
 
 def test_very_stiff_linear_models_are_exact():
@@ -251,19 +216,6 @@ def test_the_derived_equations_are_the_page_s():
         assert mean == equations.drift
 
 
-def test_trajectories_of_an_ensemble_do_not_change_one_another_by_more_than_the_accuracy():
-    structure = gaussian(van_der_pol(accuracy=1e-9)).at(0)
-    z = np.array([[1.5, -0.8], [0.1, 3.0], [-2.0, 0.5]])
-    p = np.array([np.diag([0.3, 0.5]), np.diag([0.01, 0.2]), np.diag([1.0, 0.1])])
-    together = structure.predict(z, p)
-    for i in range(3):
-        alone = structure.predict(z[i : i + 1], p[i : i + 1])
-        np.testing.assert_allclose(together.mean[i], alone.mean[0], atol=1e-7)
-        np.testing.assert_allclose(together.cov[i], alone.cov[0], atol=1e-7)
-    shared = structure.predict(z, p[0])
-    np.testing.assert_allclose(shared.cov[0], structure.predict(z[:1], p[:1]).cov[0], atol=1e-7)
-
-
 def test_means_and_second_moments_of_the_exact_multiplicative_object():
     """M x' = m exp(a (t^2 - s^2) / 2), M x'^2 = (M x^2) exp((2 a + b^2) (t^2 - s^2) / 2)."""
     a, b = -0.3, 0.4
@@ -280,31 +232,26 @@ def test_means_and_second_moments_of_the_exact_multiplicative_object():
 # ---------------------------------------------------------------- published figures
 
 
-def published(model, y, structure=gaussian):
-    """Jimenez's sum: over the innovations after the first, and (1/2) ln 2 pi once more."""
-    return likelihood(aof(structure(model)), y)[1:].sum() - 0.5 * np.log(2 * np.pi)
-
-
-def test_the_log_likelihood_of_the_exact_multiplicative_object():
-    a, b, printed = EXACT_MUL
-    assert published(exact_mul(a, b), jimenez_data("exact-mul")[1]) == pytest.approx(
-        printed, abs=5e-4
-    )
-
-
-def test_the_log_likelihood_of_the_double_well():
-    *values, printed = DOUBLE_WELL
-    t, y = jimenez_data("double-well")
-    assert np.array_equal(t, np.arange(501)) and y[0] == 0
-    y[0] = np.nan  # x(0) is known, and measured without error
-    assert published(double_well(*values), y) == pytest.approx(printed, abs=1e-4)
+@pytest.mark.parametrize(
+    ("model", "data", "printed", "allowed"),
+    [
+        (exact_mul(*EXACT_MUL[:2]), "exact-mul", EXACT_MUL[2], 5e-4),
+        (double_well(*DOUBLE_WELL[:-1]), "double-well", DOUBLE_WELL[-1], 1e-4),
+    ],
+)
+def test_log_likelihoods_are_the_published_ones(model, data, printed, allowed):
+    """Jimenez's sum: over the innovations after the first, and (1/2) ln 2 pi once more.  The first
+    measurement of the double well is without error."""
+    y = jimenez_data(data)[1]
+    y[0] = np.nan if data == "double-well" else y[0]
+    total = likelihood(aof(gaussian(model)), y)[1:].sum() - 0.5 * np.log(2 * np.pi)
+    assert total == pytest.approx(printed, abs=allowed)
 
 
 def test_the_estimates_of_the_exact_multiplicative_object():
     fitted = estimate(exact_mul(-0.1, 0.1), jimenez_data("exact-mul")[1], ["a", "b"], ["b"])
-    a, b, _ = EXACT_MUL
     # his sum leaves the first measurement out
-    assert fitted.value == pytest.approx([a, b], abs=2e-3)
+    assert fitted.value == pytest.approx(EXACT_MUL[:2], abs=2e-3)
 
 
 # ---------------------------------------------------------------- Benes
@@ -338,24 +285,22 @@ def bayes_on_a_grid(y, interval, r):
 
 def test_benes_filter_is_bayes_rule():
     y = np.array([0.3, 0.5, -0.4, np.nan, -1.2, 0.8])
-    chosen = benes_filter(benes())
-    law, terms = run(chosen, y), likelihood(chosen, y)
-    mean, variance, densities = bayes_on_a_grid(y, 0.2, 0.1)
-    np.testing.assert_allclose(law.mean[1:, 0, 0], mean, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(law.cov[1:, 0, 0, 0], variance, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(terms[1:, 0], densities, rtol=0, atol=1e-10)
+    filter_ = benes_filter(benes())
+    law, terms = run(filter_, y), likelihood(filter_, y)
+    ours = [law.mean[1:, 0, 0], law.cov[1:, 0, 0, 0], terms[1:, 0]]
+    np.testing.assert_allclose(ours, bayes_on_a_grid(y, 0.2, 0.1), rtol=0, atol=1e-10)
 
 
 def test_no_filter_beats_benes_and_the_quadrature_filter_comes_near():
-    model = benes(interval=1.0, substeps=64)
+    model = benes(interval=1.0, substeps=32)
     filters = [benes_filter(model), aof(gauss_hermite(model, 9)), aof(linearised(model))]
-    compared = compare(filters, model, 4000, 12, seed=1)
+    compared = compare(filters, model, 3000, 8, seed=1)
     for worse, better in (("aof-gauss-hermite", "benes"), ("aof-linearised", "aof-gauss-hermite")):
         difference = compared.difference(worse, better)
         assert (difference.value[1:] > -4 * difference.standard_error[1:]).all()
         assert difference.value[3:].mean() > 0
     # its own covariance is the actual one
-    own = run(benes_filter(model), simulate(model, 4000, 12, 2).y).cov[..., 0, 0].mean(axis=1)
+    own = run(benes_filter(model), simulate(model, 3000, 8, 2).y).cov[..., 0, 0].mean(axis=1)
     actual = compared.error_variance("benes")
     # own has an error, too
     assert (np.abs(own - actual.value)[1:] < 6 * actual.standard_error[1:]).all()
@@ -376,45 +321,36 @@ def test_benes_filter_refuses_other_objects():
 # ---------------------------------------------------------------- simulation
 
 
-def strong_errors(model, exact, substeps):
-    """Mean absolute errors at the end of an interval, on common Wiener paths; and their standard
-    errors."""
-    rng = np.random.default_rng(5)
-    finest, runs = max(substeps), 4000
-    fine = rng.standard_normal((runs, finest))
-    x = np.full((runs, 1), 1.0)
-    errors = []
-    for count in substeps:
-        noise = fine.reshape(runs, count, -1).sum(axis=-1) / np.sqrt(finest // count)
-        between = dataclasses.replace(model.between, substeps=count)
-        error = np.abs(between.motion(model)(x, noise, 0) - exact(fine))
-        errors.append((error.mean(), error.std() / np.sqrt(runs)))
-    return np.array(errors).T
-
-
-def test_the_strong_order_of_the_simulation():
-    counts = [4, 16, 64, 256]
-    geometric = sampled("0.5*x", "0.8*x", "x + w")
-    mean, error = strong_errors(
-        geometric,
-        lambda fine: np.exp(0.5 - 0.32 + 0.8 * fine.sum(axis=1) / np.sqrt(256))[:, None],
-        counts,
+@pytest.mark.parametrize(
+    ("drift", "diffusion", "counts", "order", "exact"),
+    [
+        (
+            "0.5*x",
+            "0.8*x",
+            [4, 16, 64, 256],
+            0.5,
+            lambda w: np.exp(0.5 - 0.32 + 0.8 * w.sum(axis=1) / np.sqrt(256))[:, None],
+        ),
+        ("-sin(2*x)", "0.8", [4, 16, 64], 1.0, None),
+    ],
+)
+def test_the_strong_order_of_the_simulation(drift, diffusion, counts, order, exact):
+    """Mean absolute errors at the end of an interval, on common Wiener paths: of the exact
+    solution, or of the finest steps where the noise is added."""
+    model, finest, x = (
+        sampled(drift, diffusion, "x + w"),
+        256 if exact else 4096,
+        np.ones((4000, 1)),
     )
-    orders = np.log(mean[:-1] / mean[1:]) / np.log(4)
-    assert np.abs(orders - 0.5).max() < 0.1 and (4 * error / mean < 0.1 * np.log(4)).all()
-    additive = sampled("-sin(2*x)", "0.8", "x + w")
-    finest = dataclasses.replace(additive.between, substeps=4096)
-    path = np.random.default_rng(6).standard_normal((4000, 4096))
-    wanted = finest.motion(additive)(np.full((4000, 1), 1.0), path, 0)
-    errors = []
-    for count in counts[:3]:
-        noise = path.reshape(4000, count, -1).sum(axis=-1) / np.sqrt(4096 // count)
-        got = dataclasses.replace(additive.between, substeps=count).motion(additive)(
-            np.full((4000, 1), 1.0), noise, 0
-        )
-        errors.append(np.abs(got - wanted).mean())
-    orders = np.log(np.array(errors[:-1]) / errors[1:]) / np.log(4)
-    assert np.abs(orders - 1).max() < 0.15
+    path = np.random.default_rng(5).standard_normal((4000, finest))
+
+    def end(count):
+        noise = path.reshape(4000, count, -1).sum(axis=-1) / np.sqrt(finest // count)
+        return dataclasses.replace(model.between, substeps=count).motion(model)(x, noise, 0)
+
+    wanted = exact(path) if exact else end(finest)
+    errors = np.log([np.abs(end(count) - wanted).mean() for count in counts])
+    np.testing.assert_allclose(-np.diff(errors) / np.log(4), order, atol=0.15)
 
 
 def test_the_weak_order_where_the_noise_is_added():
@@ -434,9 +370,7 @@ def test_an_ensemble_has_the_moments_that_are_integrated():
     model = oscillator(substeps=32)
     x = simulate(model, 20_000, 6, seed=2).x
     mean, cov = PRIOR
-    for k, (Phi, shift, Q) in enumerate(transitions()):
-        if k == 5:
-            break
+    for k, (Phi, shift, Q, *_) in enumerate(STEPS[:5]):
         mean, cov = Phi @ mean + shift, Phi @ cov @ Phi.T + Q
         error = np.sqrt(np.diag(cov) / 20_000)
         # and (1/32)^2 of weak error
@@ -481,27 +415,12 @@ def test_fos_and_duof_tend_to_kalmans_filter():
         assert np.abs(relative.value - 1).max() < 0.01
 
 
-def test_particles_agree_with_the_normal_filter_where_it_is_exact():
-    model = sampled("-0.5*x", "0.9", "x + 0.5*w", interval=0.8, substeps=16)
-    y = simulate(model, 2, 6, 4).y
-    ours, exact = run(particle(model, 4000), y), run(aof(gaussian(model)), y)
-    # a quarter of them count
-    assert np.abs(ours.mean - exact.mean).max() < 6 * np.sqrt(exact.cov.max() / 1000)
-
-
 def test_parameters_are_estimated_as_everywhere():
     """Of Ornstein and Uhlenbeck's process seen without error the maximum is that of a regression,
     in closed form."""
-    truth = sampled(
-        "-a*x",
-        "s",
-        "x + 0*w",
-        {"a": 0.8, "s": 1.1},
-        interval=0.5,
-        prior={"variance": 0},
-        substeps=32,
-    )
-    y = simulate(truth, 1, 400, 7).y
+    values, prior = {"a": 0.8, "s": 1.1}, {"variance": 0}
+    truth = sampled("-a*x", "s", "x + 0*w", values, interval=0.5, prior=prior)
+    y = simulate(truth, 1, 60, 7).y
     x = y[:, 0, 0]
     slope = (x[1:] @ x[:-1]) / (x[:-1] @ x[:-1])
     a = -np.log(slope) / 0.5
@@ -555,36 +474,40 @@ def test_the_model_is_printed_as_a_differential_equation():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "options", "error", "words"),
     [
-        (("x", ["1"], "x + w"), "list of rows"),
-        (("x", 1.5, "x + w"), "list of rows"),
-        (("x", [["1"], ["2"]], "x + w"), "a row for each of x: it has 2"),
-        ((["x1", "x2"], [["1", "0"], ["2"]], "x1 + w"), "rows of different lengths"),
-        (("x + v", "1", "x + w"), "holds noise"),
-        (("x", "1", "x + w", {"t": 1}), "t is the time"),
-        (("v2*x", "1", "x + w", {"v2": 1}), "those of the noises"),
+        (("x", ["1"]), {}, ModelError, "list of rows"),
+        (("x", 1.5), {}, ModelError, "list of rows"),
+        (("x", [["1"], ["2"]]), {}, ModelError, "a row for each of x: it has 2"),
+        ((["x", "z"], [["1", "0"], ["2"]]), {}, ModelError, "rows of different lengths"),
+        (("x + v", "1"), {}, ModelError, "holds noise"),
+        (("x", "1"), {"parameters": {"t": 1}}, ModelError, "t is the time"),
+        (("v2*x", "1"), {"parameters": {"v2": 1}}, ModelError, "those of the noises"),
+        (("x", "q"), {}, FormulaError, "unknown symbol 'q'"),
+        (("x", "1"), {"instants": [0, 1, 0.5]}, ModelError, "t_2 = 0.5 comes after t_1 = 1"),
+        (("x", "1"), {"accuracy": 0}, ModelError, "accuracy"),
+        (("x", "1"), {"substeps": 0}, ValueError, "substeps"),
     ],
 )
-def test_what_is_no_model(arguments, words):
-    with pytest.raises(ModelError, match=words):
-        sampled(*arguments)
+def test_what_is_no_model(arguments, options, error, words):
+    names = {"x": arguments[0]} if isinstance(arguments[0], list) else {}
+    with pytest.raises(error, match=words):
+        sampled(*arguments, "x + w", **options, **({"symbols": names} if names else {}))
 
 
-def test_other_mistakes():
-    with pytest.raises(FormulaError, match="unknown symbol 'q'"):
-        sampled("x", "q", "x + w")
-    with pytest.raises(ModelError, match=r"t_2 = 0.5 comes after t_1 = 1"):
-        sampled("x", "1", "x + w", instants=[0, 1, 0.5])
-    with pytest.raises(ModelError, match="accuracy"):
-        sampled("x", "1", "x + w", accuracy=0)
-    with pytest.raises(ValueError, match="substeps"):
-        sampled("x", "1", "x + w", substeps=0)
+def test_what_such_models_are_not_for():
     with pytest.raises(NoClosedForm, match="tanh"):
         gaussian(benes())
     for other in (kalman_filter, lambda model: posterior_bound(model, 10, 3, 1)):
         with pytest.raises(ModelError, match="moves in continuous time between"):
             other(sampled("-x", "1", "x + w"))
+
+
+@pytest.mark.parametrize("drift", ["x**3", "-500*x"])
+def test_trajectories_that_leave_all_bounds_are_named(drift):
+    """The second by its sub-steps alone: each multiplies the state."""
+    with pytest.raises(NotFinite, match=r"a trajectory passes 1e.100: .*give more `substeps`"):
+        simulate(sampled(drift, "1", "x + w", substeps=10), runs=5, steps=16, seed=1)
 
 
 def test_a_drift_that_explodes_is_named():
@@ -610,10 +533,8 @@ def test_stiff_equations_are_left_to_an_implicit_method():
     with pytest.raises(NotFinite, match="stiff, and 100 trajectories"):
         gaussian(model).at(0).predict(np.zeros((100, 1)), np.ones((1, 1)))
     # 100 steps of many trajectories tell that 30,000 would not do; a drift that explodes is none
-    begun = process_time()
     with pytest.raises(NotFinite, match="stiff, and 20000 trajectories"):
         gaussian(model).at(0).predict(np.zeros((20_000, 1)), np.ones((1, 1)))
-    assert process_time() - begun < 10
     explodes = sampled("x**3 + x", "1", "x + w")
     with pytest.raises(NotFinite, match="the moments become infinite"):
         gaussian(explodes).at(0).predict(np.ones((100, 1)), np.ones((1, 1)))
@@ -628,61 +549,53 @@ def test_many_trajectories_that_turn_fast_are_no_stiff_ones():
     np.testing.assert_allclose(tau, z @ turn.T, rtol=0, atol=4e-3)
 
 
-def test_a_table_has_drift_and_diffusion(tmp_path):
-    """The school's CD1 with a drift that comes back, from a file; and what is wrong with tables."""
-    path = tmp_path / "my.toml"
-    table = """[variants.{}]
-title = "cubic drift, quadratic meter"
-drift = "a1*x + a3*x**3"
-{}
-meter = "x + 0.5*x**2 + w"
-parameters = {{ a1 = -0.5, a3 = -0.01 }}
-steps = 11
-"""
-    texts = [
-        table.format(name, more)
-        for name, more in (("CD1", 'diffusion = "1.5"'), ("none", ""), ("row", 'diffusion = ["1"]'))
-    ]
-    path.write_text(
-        "\n".join([*texts, table.format("state", 'diffusion = "1"\nstate = "x"')]), encoding="utf-8"
-    )
-    chosen = find_variant("CD1", path)
-    assert chosen.steps == 11 and chosen.model.between.diffusion[0] == sp.Rational(3, 2)
+TABLE = {
+    "title": "cubic drift, quadratic meter",
+    "drift": "a1*x + a3*x**3",
+    "meter": "x + 0.5*x**2 + w",
+    "parameters": {"a1": -0.5, "a3": -0.01},
+    "steps": 11,
+}
+
+
+def test_a_table_has_drift_and_diffusion():
+    """The school's CD1 with a drift that comes back."""
+    variant = read_variant("CD1", TABLE | {"diffusion": "1.5"}, "here")
+    assert variant.steps == 11 and variant.model.between.diffusion[0] == sp.Rational(3, 2)
     z, p = 0.7, 0.4
-    equations = moment_equations(chosen.model)
-    at = {equations.z[0]: z, equations.p[0]: p} | chosen.model.values
+    equations = moment_equations(variant.model)
+    at = {equations.z[0]: z, equations.p[0]: p} | variant.model.values
     # the page's: a1 z + a3 (z^3 + 3 z p), a1 + 3 a3 (z^2 + p), 2.25
     wanted = [-0.5 * z - 0.01 * (z**3 + 3 * z * p), -0.5 - 0.03 * (z**2 + p), 2.25]
     assert [float(part[0].subs(at)) for part in equations[2:]] == pytest.approx(wanted, abs=1e-12)
-    h, G, F, _ = gaussian(chosen.model).at(0).measure(np.array([[z]]), np.array([[[p]]]))
-    assert [h.item(), G.item(), F.item()] == pytest.approx(
-        [z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + 1]
-    )
-    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", chosen.table)
-    for name, words in (
-        ("none", "no diffusion"),
-        ("row", "list of rows"),
-        ("state", "unknown key state"),
-    ):
-        with pytest.raises(VariantError, match=words):
-            find_variant(name, path)
+    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", variant.table)
 
 
-def test_the_command_ranks_the_filters_of_such_a_variant(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, "no diffusion"),
+        ({"diffusion": ["1"]}, "list of rows"),
+        ({"diffusion": "1", "state": "x"}, "unknown key state"),
+    ],
+)
+def test_tables_that_are_no_variant_are_refused(change, words):
+    with pytest.raises(VariantError, match=words):
+        read_variant("CD1", TABLE | change, "here")
+
+
+def test_the_command_compares_the_filters_of_such_a_variant(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("my.toml").write_text(
         '[variants.mine]\ndrift = "-a*x"\ndiffusion = "1"\nmeter = "x + w"\nparameters = { a = '
         "0.5 }\n"
     )
-    chosen = ["--filters", "aof-linearised,duof", "--runs", "300", "--steps", "3"]
+    sizes = ["--runs", "128", "--steps", "2", "--filters", "aof-exact,aof-linearised", "--scores"]
     done = CliRunner().invoke(
-        main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"]
+        main, ["lab", "mine", "--variants", "my.toml", *sizes, "--json", "numbers.json"]
     )
     assert done.exit_code == 0 and "LAOF" in done.stdout and Path("lab-mine/report.tex").exists()
     numbers = json.loads(Path("numbers.json").read_text(encoding="utf-8"))
-    assert numbers["model"]["drift"] == ["-a*x"] and numbers["model"]["diffusion"] == ["[1]"]
-    assert "log score" not in done.stdout and "log_score" not in numbers
-    command = ["lab", "mine", "--variants", "my.toml", "--runs", "128", "--steps", "2", "--scores"]
-    done = CliRunner().invoke(main, [*command, "--filters", "aof-exact,aof-linearised"])
+    assert (numbers["model"]["drift"], numbers["model"]["diffusion"]) == ("-a*x", "1")
     scores = done.stdout.split("CRPS\n")[1].splitlines()[:2]
     assert [line.split()[-1] == "–" for line in scores] == [True, False]  # its law is not normal

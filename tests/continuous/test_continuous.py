@@ -2,10 +2,12 @@
 discretisation, python-control."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import control
 import numpy as np
+import oracles
 import pytest
 import scipy.integrate
 import scipy.linalg
@@ -17,7 +19,6 @@ from kfcourse.continuous import (
     extended_kalman_bucy,
     filter_equations,
     linear_matrices,
-    log_likelihood_rate,
     simulate,
     steady_state,
     symmetrised_drift,
@@ -100,7 +101,6 @@ def parabola(**changes):
 
 
 # --- simulation
-# -------------------------------------------------------------------------------------------------------------
 
 
 def test_simulated_moments_are_those_of_the_ornstein_uhlenbeck_process():
@@ -113,19 +113,14 @@ def test_simulated_moments_are_those_of_the_ornstein_uhlenbeck_process():
     path = simulate(ornstein_uhlenbeck(), T, 3, runs, 5, substeps)
     variance, decay = q / (2 * a), math.exp(-a * T)
     for k in range(4):
-        assert abs(np.mean(path.x[k] ** 2) - variance) < 4 * variance * math.sqrt(2 / runs)
-        assert abs(np.mean(path.x[k])) < 4 * math.sqrt(variance / runs)
-    lag = path.x[1, :, 0] * path.x[2, :, 0]
-    assert abs(np.mean(lag) - variance * decay) < 4 * variance * math.sqrt((1 + decay**2) / runs)
+        oracles.has_moments(path.x[k], [0], np.array([[variance]]))
+    oracles.is_mean(variance * decay, path.x[1] * path.x[2])
     # the mean of x over an interval has the variance q/(2a) * 2 (e^-aT - 1 + aT) / (aT)^2
     mean_variance = variance * 2 * (decay - 1 + a * T) / (a * T) ** 2
     expected = h**2 * mean_variance + 0.4 / (2 * T)
-    assert abs(np.mean(path.y[1] ** 2) - expected) < 4 * expected * math.sqrt(2 / runs)
+    oracles.has_moments(path.y[1], [0], np.array([[expected]]))
     # noises of successive measurements are independent: only the state correlates them
-    cross = h**2 * variance * ((1 - decay) / (a * T)) ** 2
-    assert abs(np.mean(path.y[0] * path.y[1]) - cross) < 4 * math.sqrt(
-        (expected**2 + cross**2) / runs
-    )
+    oracles.is_mean(h**2 * variance * ((1 - decay) / (a * T)) ** 2, path.y[0] * path.y[1])
 
 
 def test_multiplicative_noise_is_taken_in_itos_sense():
@@ -136,10 +131,10 @@ def test_multiplicative_noise_is_taken_in_itos_sense():
         "a*x", "s*x", "x", {"a": a, "s": s}, prior={"mean": 2, "variance": 0.0}, spectral_density=S
     )
     x = simulate(model, T, 1, runs, 8, substeps=100).x[1, :, 0]
-    error = x.std() / math.sqrt(runs)
     # Euler's own mean is 2 (1 + a T / 100)^100, 2 e^{aT} but for 5e-4 of it: a sixth of a standard
     # error
-    assert abs(x.mean() - 2 * math.exp(a * T)) < 4 * error
+    oracles.is_mean(2 * math.exp(a * T), x)
+    error = x.std() / math.sqrt(runs)
     assert abs(x.mean() - 2 * math.exp((a + s**2 * S / 4) * T)) > 20 * error
     x_, xi = sp.symbols("x xi", real=True)
     extra = symmetrised_drift(
@@ -153,24 +148,14 @@ def test_correlated_noises_have_their_covariances():
     covariances."""
     runs, T = 50_000, 0.01
     model = nonlinear_vector()
-    still = ContinuousModel.define(
-        list(model.drift),
-        model.diffusion,
-        list(model.signal),
-        {"a": 0.8},
-        prior={"mean": [0.6, -0.5], "variance": 0.0},
-        spectral_density=S_VECTOR,
-        noise_density=N_VECTOR,
-    )
+    still = replace(model, prior=Gaussian(model.prior.mean, np.zeros((2, 2))))
     path = simulate(still, T, 1, runs, 3)
     g = np.array([[0.3, 0.06], [-0.1, 0.5]])
     for sample, cov in (
         (path.x[1] - path.x[0], g @ np.array(S_VECTOR) @ g.T * T / 2),
         (path.y[0], np.array(N_VECTOR) / (2 * T)),
     ):
-        found = np.cov(sample.T)
-        error = np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / runs)
-        assert (abs(found - cov) < 4 * error).all()
+        oracles.has_moments(sample, sample.mean(axis=0), cov)
 
 
 def test_a_coarse_path_is_the_same_path():
@@ -183,13 +168,6 @@ def test_a_coarse_path_is_the_same_path():
     assert seen.step == pytest.approx(0.06)
     assert np.allclose(seen.x, coarse.x, rtol=1e-13, atol=0)
     assert np.allclose(seen.y, coarse.y, rtol=1e-12, atol=1e-12)
-    for k in range(4):  # straight from the definition
-        assert np.array_equal(seen.x[k], fine.x[6 * k])
-        assert np.allclose(
-            seen.y[k], sum(fine.y[6 * k + i] for i in range(6)) / 6, rtol=0, atol=1e-13
-        )
-    twice = coarsen(coarsen(fine, 2), 3)
-    assert np.array_equal(twice.x, seen.x) and np.allclose(twice.y, seen.y, rtol=0, atol=1e-13)
 
 
 def test_an_explosion_is_reported():
@@ -199,7 +177,6 @@ def test_an_explosion_is_reported():
 
 
 # --- the discrete model
-# -----------------------------------------------------------------------------------------------------
 
 
 def test_the_discrete_model_is_eulers():
@@ -220,31 +197,7 @@ def test_the_discrete_model_is_eulers():
     assert discrete.prior == model.prior
 
 
-def test_the_discrete_limit_of_the_covariance_equation():
-    """(Theta of the linearised discrete model after its correction - D) / T tends to the Riccati
-    rate, the error falls as T."""
-    model = oscillator()
-    A, G, H = linear_matrices(model)
-    D = np.array([[0.5, -0.1], [-0.1, 0.7]])
-    rate = (
-        A @ D
-        + D @ A.T
-        + G @ np.array(S_VECTOR) @ G.T / 2
-        - D @ H.T @ np.linalg.inv(np.array(N_VECTOR) / 2) @ H @ D
-    )
-    errors = []
-    for T in (2e-3, 1e-3):
-        structure = linearised(to_discrete(model, T))
-        m = structure.measure(np.zeros(2), D)
-        corrected = D - D @ m.G.T @ np.linalg.inv(m.F) @ m.G @ D
-        errors.append(np.abs((structure.predict(np.zeros(2), corrected).cov - D) / T - rate).max())
-    assert errors[0] < 0.1 * np.abs(rate).max()
-    # c T + d T^2: the ratio is 2 but for a term of order T
-    assert 1.9 < errors[0] / errors[1] < 2.1
-
-
 # --- formulas
-# ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("make", [parabola, nonlinear_vector, oscillator])
@@ -276,29 +229,11 @@ def test_derivatives_against_finite_differences(make):
             a, b = h * unit[i], h * unit[j]
             second = (F(z + a + b) - F(z + a - b) - F(z - a + b) + F(z - a - b)) / (4 * h**2)
             assert abs(U[i, j] - second) < 1e-5
-
-
-def test_linear_signal_leaves_the_riccati_term():
-    model = oscillator()
-    full, usual = filter_equations(model), filter_equations(model, second_derivatives=False)
-    N = sp.Matrix(
-        [[sp.Rational(3, 10), sp.Rational(1, 10)], [sp.Rational(1, 10), sp.Rational(1, 5)]]
-    )
-    H = sp.Matrix([[1, sp.Rational(3, 10)], [0, sp.Rational(4, 5)]])
-    assert (full.U + 2 * H.T * N.inv() * H).applyfunc(sp.simplify) == sp.zeros(2, 2)
-    assert (full.U - usual.U).applyfunc(sp.simplify) == sp.zeros(2, 2)
-
-
-def test_the_log_likelihood_rate_completes_the_square():
-    """F = y^T N^-1 y - (y - S)^T N^-1 (y - S)."""
-    S, y = sp.Matrix(sp.symbols("S1 S2")), sp.Matrix(sp.symbols("y1 y2"))
-    N = sp.Matrix([[2, 1], [1, 3]])
-    square = ((y - S).T * N.inv() * (y - S))[0]
-    assert sp.expand(log_likelihood_rate(S, y, N) - (y.T * N.inv() * y)[0] + square) == 0
+    usual = filter_equations(model, second_derivatives=False)
+    assert ((e.U - usual.U).applyfunc(sp.simplify) == sp.zeros(model.n)) == (make is oscillator)
 
 
 # --- the filter against slow loops
-# ------------------------------------------------------------------------------------------
 
 SIGNALS = {  # S and its first three derivatives, by hand
     "x + 0.7*x**2/2": (
@@ -331,21 +266,23 @@ def test_the_scalar_filter_is_the_loop_in_plain_floats(signal, second, symmetris
         noise_density=N,
     )
     y = simulate(model, T, steps, runs, 2).y
-    found = predictions(extended_kalman_bucy(model, T, second, symmetrised), y)
+    y[7, 1] = y[20:23, 2] = np.nan
+    ours = predictions(extended_kalman_bucy(model, T, second, symmetrised), y)
     S, S1, S2, S3 = SIGNALS[signal]
     for r in range(runs):
         z, D = 0.4, 0.3
         for k in range(steps):
             # rounding of 60 steps
-            assert math.isclose(found.mean[k, r, 0], z, rel_tol=1e-11, abs_tol=1e-12)
-            assert math.isclose(found.cov[k, r, 0, 0], D, rel_tol=1e-11)
-            innovation = y[k, r, 0] - S(z)
-            B = 1 / (1 / D + T * S1(z) ** 2 * 2 / N)
+            assert math.isclose(ours.mean[k, r, 0], z, rel_tol=1e-11, abs_tol=1e-12)
+            assert math.isclose(ours.cov[k, r, 0, 0], D, rel_tol=1e-11)
+            seen = not np.isnan(y[k, r, 0])
+            innovation = y[k, r, 0] - S(z) if seen else 0.0
+            B = 1 / (1 / D + T * S1(z) ** 2 * 2 / N) if seen else D
             M, dz, dD = 1.0, 0.0, 0.0
-            if second:
+            if second and seen:
                 W, V = S2(z) * 2 / N * innovation, S2(z) ** 2 * 2 / N * B
                 M = (1 + T * B * W / 2) / (1 + T * B * V / 8)
-            if symmetrised:
+            if symmetrised and seen:
                 dz = B**2 * S1(z) * S2(z) / N * (2 if second else 1)
                 dD = B**3 * (2 * S2(z) ** 2 + S1(z) * S3(z)) / N if second else 0.0
             A, Q = -1.1 + 0.2 * z, (0.8 + 0.2 * z) ** 2 * S_xi / 2
@@ -358,14 +295,14 @@ def test_the_vector_filter_is_the_page():
     T, steps, runs = 0.01, 40, 3
     model = nonlinear_vector()
     y = simulate(model, T, steps, runs, 6).y
-    found = predictions(extended_kalman_bucy(model, T, second_derivatives=True), y)
-    C = 2 * np.linalg.inv(np.array(N_VECTOR))
-    identity = np.eye(2)
+    y[3, 0, 1] = y[5:9, 1, 0] = y[9, 2] = np.nan
+    ours = predictions(extended_kalman_bucy(model, T, second_derivatives=True), y)
+    N, identity = np.array(N_VECTOR), np.eye(2)
     for r in range(runs):
         z, D = np.array([0.6, -0.5]), np.array([[0.3, 0.05], [0.05, 0.2]])
         for k in range(steps):
-            assert np.allclose(found.mean[k, r], z, rtol=1e-10, atol=1e-11)  # rounding of 40 steps
-            assert np.allclose(found.cov[k, r], D, rtol=1e-10, atol=1e-11)
+            assert np.allclose(ours.mean[k, r], z, rtol=1e-10, atol=1e-11)  # rounding of 40 steps
+            assert np.allclose(ours.cov[k, r], D, rtol=1e-10, atol=1e-11)
             x1, x2 = z
             f, A = (
                 np.array([math.sin(x2), -0.8 * x1 - x2**3 / 5]),
@@ -375,10 +312,13 @@ def test_the_vector_filter_is_the_page():
             S = np.array([x1 + 0.4 * x1 * x2, math.cos(x2) + 0.3 * x1**2])
             H = np.array([[1 + 0.4 * x2, 0.4 * x1], [0.6 * x1, -math.sin(x2)]])
             hessians = np.array([[[0, 0.4], [0.4, 0]], [[0.6, 0], [0, -math.cos(x2)]]])
-            innovation = y[k, r] - S
+            seen = ~np.isnan(y[k, r])
+            H, hessians, innovation = H[seen], hessians[seen], (y[k, r] - S)[seen]
+            C = 2 * np.linalg.inv(N[np.ix_(seen, seen)])
             B = np.linalg.inv(np.linalg.inv(D) + T * H.T @ C @ H)
-            W = sum((C @ innovation)[i] * hessians[i] for i in range(2))
-            V = sum(C[i, j] * hessians[i] @ B @ hessians[j] for i in range(2) for j in range(2))
+            # with a component missing, the second derivatives are left out
+            W = seen.all() * np.einsum("i,iab", C @ innovation, hessians)
+            V = seen.all() * np.einsum("ij,iab,bc,jcd", C, hessians, B, hessians)
             M = np.linalg.inv(identity + T / 8 * B @ V) @ (identity + T / 2 * B @ W)
             z = z + T * (f + B @ H.T @ C @ innovation)
             D = (M + T * A) @ B @ (M + T * A).T + T * g @ np.array(S_VECTOR) @ g.T / 2
@@ -416,9 +356,9 @@ def test_the_white_term_has_the_mean_that_its_sense_demands(symmetrised):
     weight = np.array([a * b for a in weights for b in weights]) / weights.sum() ** 2
     left = []
     for T in (2e-4, 1e-4):
-        one = extended_kalman_bucy(model, T, True, symmetrised)
+        filter_ = extended_kalman_bucy(model, T, True, symmetrised)
         y = S + pairs @ np.linalg.cholesky(np.array(N_VECTOR) / (2 * T)).T
-        posterior = one.step(one.init(len(y)), y).posterior
+        posterior = filter_.step(filter_.init(len(y)), y).posterior
         left.append(np.abs((np.tensordot(weight, posterior.cov, 1) - D) / T - rate_cov).max())
         assert np.abs(
             (weight @ posterior.mean - model.prior.mean) / T - rate_mean
@@ -428,7 +368,6 @@ def test_the_white_term_has_the_mean_that_its_sense_demands(symmetrised):
 
 
 # --- linear models
-# ----------------------------------------------------------------------------------------------------------
 
 
 def exact_filter(model, T, y):
@@ -476,36 +415,17 @@ def test_the_filter_of_a_linear_model_tends_to_the_exact_one(make):
     rms, worst = [], []
     for factor in (16, 8, 4):
         path = coarsen(fine, factor)
-        found = run(extended_kalman_bucy(model, path.step), path.y)
+        law = run(extended_kalman_bucy(model, path.step), path.y)
         means, covs = exact_filter(model, path.step, path.y)
-        rms.append(np.sqrt(np.mean((found.mean - means[1:]) ** 2)))
-        worst.append(np.abs(found.cov[:, 0] - covs[1:]).max())
+        rms.append(np.sqrt(np.mean((law.mean - means[1:]) ** 2)))
+        worst.append(np.abs(law.cov[:, 0] - covs[1:]).max())
     for errors in (rms, worst):
         for coarse, half in pairwise(errors):
             assert 1.6 < coarse / half < 2.4
     assert rms[-1] < 0.02 * np.sqrt(np.mean(means**2))
 
 
-def test_the_scalar_riccati_equation_has_its_closed_form():
-    """dD/dt = -2 a D + q - c D^2: D(t) by the hyperbolic tangent; the scheme's error halves with
-    the step."""
-    a, q, c, D0 = 0.7, 1.3**2 * 0.9 / 2, 1.5**2 * 2 / 0.4, 3.0
-    model = ornstein_uhlenbeck(prior={"variance": D0})
-    root = math.sqrt(a * a + c * q)
-    errors = []
-    for T in (0.02, 0.01):
-        steps = round(1 / T)
-        D = predictions(extended_kalman_bucy(model, T), np.zeros((steps, 1, 1))).cov[:, 0, 0, 0]
-        t = T * np.arange(steps)
-        tanh = np.tanh(root * t)
-        exact = (D0 * (root - a * tanh) + q * tanh) / (root + (a + c * D0) * tanh)
-        errors.append(np.abs(D - exact).max())
-    assert 1.6 < errors[0] / errors[1] < 2.4  # the first steps from D0 = 3 are far from linear in T
-    assert errors[1] < 0.1
-
-
 # --- functions of time
-# ------------------------------------------------------------------------------------------------------
 
 
 def varying(**changes):
@@ -525,36 +445,21 @@ def varying(**changes):
     )
 
 
-def varying_moments(times):
-    """Mean and variance of `varying` without measurements, and the error variance of its optimal
-    filter: ODEs of the page."""
-
-    def rates(t, moments):
-        mean, variance, D = moments
-        A, q, H = (
-            -(0.7 + math.sin(2 * t)),
-            (0.5 + math.exp(-t)) ** 2 * 0.9 / 2,
-            1 + 0.8 * math.cos(3 * t),
-        )
-        return [
-            A * mean + math.cos(t),
-            2 * A * variance + q,
-            2 * A * D + q - (H * D) ** 2 * 2 / 0.4,
-        ]
-
-    return scipy.integrate.solve_ivp(
-        rates, (0, times[-1]), [1.5, 2.0, 2.0], t_eval=times, rtol=1e-10, atol=1e-12
-    ).y
-
-
 def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
     """The scheme's error halves with the step; D itself swings between 0.1 and 0.3 after its start
     from 2."""
+
+    def rate(t, D):
+        q, H = (0.5 + math.exp(-t)) ** 2 * 0.9 / 2, 1 + 0.8 * math.cos(3 * t)
+        return -2 * (0.7 + math.sin(2 * t)) * D + q - (H * D) ** 2 * 2 / 0.4
+
     errors = []
     for T in (0.02, 0.01, 0.005):
         steps = round(4 / T)
         D = predictions(extended_kalman_bucy(varying(), T), np.zeros((steps, 1, 1))).cov[:, 0, 0, 0]
-        exact = varying_moments(T * np.arange(steps))[2]
+        exact = scipy.integrate.solve_ivp(
+            rate, (0, 4), [2.0], t_eval=T * np.arange(steps), rtol=1e-10, atol=1e-12
+        ).y[0]
         errors.append(np.abs(D - exact)[round(0.5 / T) :].max())
     for coarse, half in pairwise(errors):
         assert 1.6 < coarse / half < 2.4
@@ -562,8 +467,7 @@ def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
 
 
 def test_the_discrete_model_has_its_functions_at_the_times_of_its_steps():
-    """f, g, S at t_k = k T; its Kalman filter has the same covariances, and estimates that differ
-    in proportion to T: f is taken at the corrected estimate instead of the predicted one."""
+    """f, g, S at t_k = k T; its Kalman filter has the same covariances."""
     T, x, v, w = 0.25, np.array([[0.7]]), np.array([[-0.4]]), np.array([[1.1]])
     state, meter = compile_model(to_discrete(varying(), T))
     for k in (0, 3):
@@ -571,14 +475,10 @@ def test_the_discrete_model_has_its_functions_at_the_times_of_its_steps():
         following = x + T * (-(0.7 + math.sin(2 * t)) * x + math.cos(t) + (0.5 + math.exp(-t)) * v)
         np.testing.assert_allclose(state(x, v, k), following, rtol=1e-14)
         np.testing.assert_allclose(meter(x, w, k), (1 + 0.8 * math.cos(3 * t)) * x + w, rtol=1e-14)
-    fine, apart = simulate(varying(), 0.005, 400, 200, 4), []
-    for factor in (4, 2):
-        path = coarsen(fine, factor)
-        one = run(extended_kalman_bucy(varying(), path.step), path.y)
-        two = run(aof(linearised(to_discrete(varying(), path.step))), path.y)
-        np.testing.assert_allclose(one.cov, two.cov, rtol=0, atol=1e-12)
-        apart.append(np.sqrt(np.mean((one.mean - two.mean) ** 2)))
-    assert 1.6 < apart[0] / apart[1] < 2.4
+    y = simulate(varying(), 0.02, 100, 5, 4).y
+    ours = run(extended_kalman_bucy(varying(), 0.02), y)
+    discrete = run(aof(linearised(to_discrete(varying(), 0.02))), y)
+    np.testing.assert_allclose(ours.cov, discrete.cov, rtol=0, atol=1e-12)
 
 
 def test_names_of_the_time():
@@ -598,21 +498,13 @@ def test_steady_state_is_that_of_python_control(make):
     model = make()
     A, G, H = linear_matrices(model)
     L, P, _ = control.lqe(A, G, H, model.spectral_density / 2, model.noise_density / 2)
-    found = steady_state(model)
+    steady = steady_state(model)
     # two solvers of the same equation, well conditioned
-    assert np.allclose(found.cov, P, rtol=1e-10, atol=1e-12)
-    assert np.allclose(found.gain, L, rtol=1e-10, atol=1e-12)
-    residual = (
-        A @ found.cov
-        + found.cov @ A.T
-        + G @ model.spectral_density @ G.T / 2
-        - found.gain @ H @ found.cov
-    )
-    assert np.abs(residual).max() < 1e-12
+    assert np.allclose(steady.cov, P, rtol=1e-10, atol=1e-12)
+    assert np.allclose(steady.gain, L, rtol=1e-10, atol=1e-12)
 
 
 # --- as a filter among the others
-# -------------------------------------------------------------------------------------------
 
 
 def test_the_continuous_and_the_discrete_extended_filter_come_together():
@@ -629,50 +521,6 @@ def test_the_continuous_and_the_discrete_extended_filter_come_together():
     error = np.sqrt(np.mean((continuous.mean - fine.x[:-1]) ** 2))
     assert differences[0] > 2 * differences[1] > 4 * differences[2]
     assert differences[2] < 0.01 * error
-
-
-def test_a_missing_measurement_corrects_nothing():
-    model = parabola()
-    for how in ((False, False), (True, False), (True, True)):
-        one = extended_kalman_bucy(model, 0.05, *how)
-        y = np.array([[[0.8], [np.nan]]])
-        both, alone = run(one, y), run(one, y[:, :1])
-        assert np.array_equal(both.mean[:, :1], alone.mean) and np.array_equal(
-            both.cov[:, :1], alone.cov
-        )
-        z, D = model.prior.mean[0], model.prior.cov[0, 0]
-        after = one.step(one.init(2), y[0])
-        assert after.posterior.mean[1, 0] == z and math.isclose(
-            after.posterior.cov[1, 0, 0], D, rel_tol=1e-15
-        )
-        q = (0.8 * (1 + z / 4)) ** 2 * 1.6 / 2
-        assert math.isclose(
-            after.predicted.mean[1, 0], z + 0.05 * (-1.1 * z + 0.1 * z**2), rel_tol=1e-14
-        )
-        assert math.isclose(
-            after.predicted.cov[1, 0, 0],
-            (1 + 0.05 * (-1.1 + 0.2 * z)) ** 2 * D + 0.05 * q,
-            rel_tol=1e-14,
-        )
-
-
-def test_a_missing_component_is_a_smaller_meter():
-    """Independent noises: without its second component the meter is the one with the first
-    alone."""
-    both = ContinuousModel.define(
-        ["x2", "-x1"], [["0"], ["1"]], ["x1", "x2"], noise_density=[0.3, 0.5]
-    )
-    first = ContinuousModel.define(["x2", "-x1"], [["0"], ["1"]], ["x1"], noise_density=0.3)
-    y = simulate(both, 0.05, 10, 4, 1).y
-    without = y.copy()
-    without[..., 1] = np.nan
-    a, b = (
-        run(extended_kalman_bucy(both, 0.05), without),
-        run(extended_kalman_bucy(first, 0.05), y[..., :1]),
-    )
-    assert np.allclose(a.mean, b.mean, rtol=1e-12, atol=1e-13) and np.allclose(
-        a.cov, b.cov, rtol=1e-12, atol=1e-13
-    )
 
 
 def test_names_that_the_filter_uses_itself():
@@ -717,7 +565,6 @@ def test_a_negative_covariance_is_an_error():
 
 
 # --- input
-# ------------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -785,7 +632,7 @@ def test_no_steady_state():
             steady_state(ContinuousModel.define(drift, diffusion, signal))
 
 
-@pytest.mark.parametrize("rate", [0.1, 0.3, 0.5, 0.7, 1.0, 1.3, 2.0, 3.0, 5.0, 7.0])
+@pytest.mark.parametrize("rate", [0.1, 0.5, 0.7, 1.3, 3.0, 7.0])
 def test_a_constant_that_is_seen_better_and_better_has_no_steady_state(rate):
     """The closed loop has a root at 0, which is found to rounding, on either side: -3e-18 is no
     decay."""
@@ -798,7 +645,5 @@ def test_a_constant_that_is_seen_better_and_better_has_no_steady_state(rate):
 
 
 def test_measurements_of_the_wrong_shape():
-    one = extended_kalman_bucy(oscillator(), 0.1)
     with pytest.raises(ValueError, match="expects 2 measurement"):
-        run(one, np.zeros((3, 4, 1)))
-    assert isinstance(run(one, np.zeros((3, 4, 2))), Gaussian)
+        run(extended_kalman_bucy(oscillator(), 0.1), np.zeros((3, 4, 1)))

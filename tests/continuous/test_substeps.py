@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg
 
-from kfcourse import compare, gaussian, likelihood, linearised, run
+from kfcourse import compare, gaussian, likelihood, linearised, predictions, run
 from kfcourse.continuous import benes_filter, sampled
 from kfcourse.filters import aof, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
@@ -102,14 +102,13 @@ def test_kalmans_filter_where_the_object_is_linear():
     )
     y = simulate(model, 30, 4, 3).y
     y[1, :7] = np.nan
-    kalman, exact = run(aof(linearised(model)), y), run(pointmass(model), y)
-    np.testing.assert_allclose(exact.mean, kalman.mean, rtol=0, atol=2e-5)
-    np.testing.assert_allclose(exact.cov, kalman.cov, rtol=0, atol=2e-5)
-    ahead = [state.predicted.mean for state in states(pointmass(model), y)[:-1]]
-    wanted = [state.predicted.mean for state in states(aof(linearised(model)), y)[:-1]]
-    np.testing.assert_allclose(ahead, wanted, rtol=0, atol=2e-5)
-    two = states(pointmass(model), y)
-    assert {state.memory.substeps for state in two[1:]} == {4}  # two of them would do
+    for law in (run, predictions):
+        for ours, kalman in zip(
+            law(pointmass(model), y), law(aof(linearised(model)), y), strict=True
+        ):
+            np.testing.assert_allclose(ours, kalman, rtol=0, atol=2e-5)
+    # two of them would do
+    assert {state.memory.substeps for state in states(pointmass(model), y)[1:]} == {4}
 
 
 def test_benes_filter_and_the_order_of_a_sub_step():

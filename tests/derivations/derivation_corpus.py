@@ -21,6 +21,8 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache
+from itertools import islice
 
 import sympy as sp
 
@@ -51,7 +53,7 @@ from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 
-LAWS = (("m", "d"), ("m", "d"), ("mu", "P"), ("lambda", "Psi"))
+LAWS = (None, None, ("mu", "P"), ("lambda", "Psi"))
 
 
 @dataclass(frozen=True)
@@ -67,15 +69,9 @@ class Chain:
     noises: tuple[sp.Symbol, ...]
 
     def text(self, rng: random.Random) -> str:
-        heading = f"variant {self.variant}\n" + (
-            f"x ~ N({self.law[0]}, {self.law[1]})\n" if self.law else ""
-        )
-        start = f"{self.name} = "
-        return (
-            heading
-            + start
-            + f"\n{' ' * rng.randint(0, 4)}= ".join(typed(line, rng) for line in self.lines)
-        )
+        law = f"x ~ N({self.law[0]}, {self.law[1]})\n" if self.law else ""
+        lines = f"\n{' ' * rng.randint(0, 4)}= ".join(typed(line, rng) for line in self.lines)
+        return f"variant {self.variant}\n{law}{self.name} = {lines}"
 
 
 @dataclass(frozen=True)
@@ -102,76 +98,57 @@ def typed(line: Node, rng: random.Random) -> str:
 
 def chains(seed: int, count: int) -> list[Chain]:
     """Right chains of the shipped variants, in turn."""
-    rng, found = random.Random(seed), []
-    variants = load_variants()
-    wanted = [
-        (name, function) for name, one in variants.items() for function in functions(one.model)
-    ]
+    rng, made = random.Random(seed), []
+    wanted = [pair for name, one in load_variants().items() for pair in functions(name, one.model)]
     rng.shuffle(wanted)
-    while len(found) < count:
-        variant, function = wanted[len(found) % len(wanted)]
-        model = variants[variant].model
+    for variant, function in (wanted * count)[:count]:
+        model = load_variants()[variant].model
         law = rng.choice(LAWS) if model.n == 1 else None
-        if law == ("m", "d") or law is None or set(law) & set(model.parameters):
-            law = None
+        law = None if law and set(law) & set(model.parameters) else law
         mean, cov = law or (("z", "p") if function[0] in "tT" else ("m", "d"))
-        key = variant, function, mean
-        if key not in _STAGED:
-            _STAGED[key] = _staged(model, function, mean, cov)
-        formulas, moments = _STAGED[key]
-        taken = set(model.parameters) | set(letters_of(model))
-        name = function if function not in taken else "M[y]" if function == "h" else ""
-        if not name:
-            wanted.remove((variant, function))
-            continue
+        formulas, moments = staged(variant, function, mean, cov)
         lines = [read_line(str(one)) for one in formulas]
         if function != "K":
             # implicit steps
             lines[2:] = [one for one in lines[2:] if rng.random() < 0.85] or lines[-1:]
         rewritten = tuple(_rewritten(one, rng, rng.randint(0, 3)) for one in lines)
         noises = model.v if function[0] in "tT" else model.w
-        found.append(Chain(variant, law, name, rewritten, moments, noises))
-    return found
+        made.append(Chain(variant, law, name_of(function, model), rewritten, moments, noises))
+    return made
 
 
-_STAGED: dict[tuple[str, str, str], tuple[list[sp.Expr], GaussianMoments]] = {}
+def name_of(function: str, model: Model) -> str:
+    """What a derivation calls it: nothing, if the letter has another meaning."""
+    taken = {*model.parameters, *(s.name for s in (*model.x, *model.v, *model.w))}
+    return function if function not in taken else "M[y]" if function == "h" else ""
 
 
-def letters_of(model: Model) -> list[str]:
-    return [s.name for s in (*model.x, *model.v, *model.w)]
+def functions(variant: str, model: Model) -> list[tuple[str, str]]:
+    names = ["tau", "Theta", "h", "G", "F", "K"]
+    if model.n > 1:
+        components = range(1, model.n + 1)
+        # of the second component a line is a page
+        names = [*(f"tau{i}" for i in components), *(f"Theta1{i}" for i in components)]
+        names += ["h1", "F11"] if model.p > 1 else ["h", "F"]
+    return [(variant, name) for name in names if name_of(name, model)]
 
 
-def functions(model: Model) -> list[str]:
-    if model.n == 1:
-        return ["tau", "Theta", "h", "G", "F", "K"]
-    components = range(1, model.n + 1)
-    entries = [f"{i}{j}" for i in components for j in components if i <= j]
-    return [
-        *(f"tau{i}" for i in components),
-        *(f"Theta{pair}" for pair in entries),
-        *(["h1", "F11"] if model.p > 1 else ["h", "F"]),
-    ]
-
-
-def _staged(
-    model: Model, function: str, mean: str, cov: str
+@cache
+def staged(
+    variant: str, function: str, mean: str, cov: str
 ) -> tuple[list[sp.Expr], GaussianMoments]:
+    model = load_variants()[variant].model
     if model.n == 1:
         m, P = sp.Matrix([symbol(mean)]), sp.Matrix([symbol(cov)])
     else:
         m = sp.Matrix([symbol(f"{mean}{i + 1}") for i in range(model.n)])
         P = sp.Matrix(model.n, model.n, lambda i, j: symbol(f"{cov}{min(i, j) + 1}{max(i, j) + 1}"))
     if function != "K":
-        name = function if model.n == 1 or function[0] != "F" or model.p > 1 else "F"
-        return stages(model, name, m, P)
-    law, slope = stages(model, "G", m, P)[1], stages(model, "G", m, P)[0][-1]
+        return stages(model, function, m, P)
+    (*_, slope), law = stages(model, "G", m, P)
     (*_, noise_state, whole), _ = stages(model, "F", m, P)
-    gain = P[0] * slope / whole
-    return [
-        P[0] * slope / noise_state,
-        gain,
-        sp.cancel(gain) if not gain.has(sp.exp) else gain,
-    ], law
+    first, gain = P[0] * slope / noise_state, P[0] * slope / whole
+    return [first, gain, sp.cancel(gain) if not gain.has(sp.exp) else gain], law
 
 
 # ---------------------------------------------------------------- unusual forms
@@ -230,20 +207,6 @@ def _unfolded(node: Node, rng: random.Random) -> Node | None:
     )
 
 
-def _doubled(node: Node, rng: random.Random) -> Node | None:
-    return (
-        product(number(2), node, number(2), exponents=(1, 1, -1))
-        if node.kind in (PRODUCT, LETTER, POWER)
-        else None
-    )
-
-
-def _negated(node: Node, rng: random.Random) -> Node | None:
-    if node.kind != SUM or len(node.parts) < 2:
-        return None
-    return Node(SUM, (Node(SUM, node.parts, tuple(-sign for sign in node.data)),), (-1,))
-
-
 def _squared(node: Node, rng: random.Random) -> Node | None:
     """A square of a sum multiplied out."""
     if (
@@ -258,30 +221,22 @@ def _squared(node: Node, rng: random.Random) -> Node | None:
 
 
 RULES = (
-    _shuffled,
-    _shuffled,
-    _distributed,
-    _distributed,
-    _split,
-    _unfolded,
-    _doubled,
-    _negated,
-    _squared,
+    *(_shuffled, _shuffled, _distributed, _distributed, _split),
+    *(_unfolded, _squared),
 )
 
 
 # ---------------------------------------------------------------- slips
 
 
-def planted(seed: int, count: int) -> list[Planted]:
-    """Chains with one slip each; every kind of slip in turn, as far as chains allow it."""
-    rng, found, made = random.Random(seed), [], chains(seed, count + 20)
+def planted(made: list[Chain], seed: int) -> list[Planted]:
+    """Chains with one slip each, so far as they allow one; every kind of slip in turn."""
+    rng, slips = random.Random(seed), []
     for chain in made:
-        kinds = [SLIPS[(len(found) + k) % len(SLIPS)] for k in range(len(SLIPS))]
-        planted_ones = (one for slip in kinds if (one := _plant(chain, slip, rng)))
-        if len(found) < count and (one := next(planted_ones, None)):
-            found.append(one)
-    return found
+        kinds = [SLIPS[(len(slips) + k) % len(SLIPS)] for k in range(len(SLIPS))]
+        possible = (slip for kind in kinds if (slip := _plant(chain, kind, rng)))
+        slips.extend(list(islice(possible, 1)))
+    return slips
 
 
 def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
@@ -376,13 +331,18 @@ def _lost_factor(line, path, node, rng, chain):
     return _term(line, path), changed(line, (*path, i), number(1))
 
 
+def _without(line, path, i):
+    """The line without the term number `i` of the sum at `path`."""
+    parent = at(line, path)
+    keep = [j for j in range(len(parent.parts)) if j != i]
+    terms, signs = ([values[j] for j in keep] for values in (parent.parts, parent.data))
+    return path, changed(line, path, Node(SUM, tuple(terms), tuple(signs)))
+
+
 def _lost_term(line, path, node, rng, chain):
     if node.kind != SUM or len(node.parts) < 2:
         return None
-    i = rng.randrange(len(node.parts))
-    keep = [j for j in range(len(node.parts)) if j != i]
-    new = Node(SUM, tuple(node.parts[j] for j in keep), tuple(node.data[j] for j in keep))
-    return path, changed(line, path, new)
+    return _without(line, path, rng.randrange(len(node.parts)))
 
 
 def _twice(line, path, node, rng, chain):
@@ -412,13 +372,7 @@ def _noise(line, path, node, rng, chain):
     term = _term(line, path)
     if not term or len(at(line, term[:-1]).parts) < 2:
         return None
-    parent = at(line, term[:-1])
-    keep = [j for j in range(len(parent.parts)) if j != term[-1]]
-    return term[:-1], changed(
-        line,
-        term[:-1],
-        Node(SUM, tuple(parent.parts[j] for j in keep), tuple(parent.data[j] for j in keep)),
-    )
+    return _without(line, term[:-1], term[-1])
 
 
 SLIPS = (_sign, _number, _power, _letter, _lost_factor, _lost_term, _twice, _moment, _noise)
@@ -442,12 +396,12 @@ def formula_of(node: Node, moments: GaussianMoments) -> sp.Expr:
         return parts[0] ** sp.Rational(node.data.numerator, node.data.denominator)
     if node.kind == CALL:
         return getattr(sp, node.data)(parts[0])
-    if (moments, parts[0]) not in _MEANS:
-        _MEANS[moments, parts[0]] = plain(moments.mean_of(parts[0]))
-    return _MEANS[moments, parts[0]]
+    return mean_of(moments, parts[0])
 
 
-_MEANS: dict[tuple[GaussianMoments, sp.Expr], sp.Expr] = {}
+@cache
+def mean_of(moments: GaussianMoments, formula: sp.Expr) -> sp.Expr:
+    return plain(moments.mean_of(formula))
 
 
 def differs_formula(chain: Chain, node: Node, formula: sp.Expr) -> bool:

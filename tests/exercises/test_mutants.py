@@ -1,62 +1,35 @@
 """Slips nobody thought of: worked solutions with one thing changed are wrong, and most are told
 what is wrong.
 
-Seeded single changes of the source: a sign, a dropped term, a product for a quotient, a lost power
-or transposition, arguments exchanged, a number.  The seed changes with the week, so that the sets
+Seeded single changes of the source, as hints look for in the key, which is written otherwise: a sign, a
+dropped term, a product for a quotient, a lost power or transposition, arguments exchanged, a
+number.  The seed changes with the week, so that the sets
 meet new ones all the time; MUTANTS=<seed> repeats a run.
 """
 
 import ast
-import datetime
 import os
 import random
 from collections import Counter
 
 import matplotlib
 import pytest
+from weekly import WEEK
 
 from kfcourse.checks import Exercise, engine, exercise, sets
+from kfcourse.checks.editing import _changed, changes
 from kfcourse.notebooks.master import read, render, solution
 
-SEED = int(os.environ.get("MUTANTS", datetime.date.today().toordinal() // 7))
+SEED = int(os.environ.get("MUTANTS", WEEK))
 EACH = 3  # changes of a solution
 SIZE = {"too-large", "too-small"}
 
 
-def changes(node):
-    """Copies of a node with one thing changed."""
-    if isinstance(node, ast.BinOp):
-        swap = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
-        if type(node.op) in swap:
-            yield ast.BinOp(node.left, swap[type(node.op)](), node.right)
-        if isinstance(node.op, ast.Add | ast.Sub | ast.Pow):
-            yield node.left
-    elif isinstance(node, ast.Attribute) and node.attr == "T":
-        yield node.value
-    elif isinstance(node, ast.Call) and len(node.args) == 2 and not node.keywords:
-        yield ast.Call(node.func, node.args[::-1], [])
-    elif (
-        isinstance(node, ast.Constant)
-        and type(node.value) in (int, float)
-        and node.value not in (0, -1)
-    ):
-        yield ast.Constant(node.value + 1)
-
-
 def mutants(source):
     """All sources with one change."""
-    for place, node in enumerate(ast.walk(ast.parse(source))):
-        for number, _ in enumerate(changes(node)):
-            tree = ast.parse(source)
-            target = list(ast.walk(tree))[place]
-
-            class Replace(ast.NodeTransformer):
-                def visit(self, node, target=target, number=number):
-                    return (
-                        list(changes(node))[number] if node is target else self.generic_visit(node)
-                    )
-
-            yield ast.unparse(ast.fix_missing_locations(Replace().visit(tree)))
+    nodes = enumerate(ast.walk(ast.parse(source)))
+    changed = [(place, i) for place, node in nodes for i, _ in enumerate(changes(node))]
+    return [_changed(source, *change, ()) for change in changed]
 
 
 def written(lab):
@@ -86,7 +59,7 @@ def outcomes():
         )
         space, sources = written(lab)
         for question in lab.questions.values():
-            possible = list(mutants(sources[question.function]))
+            possible = mutants(sources[question.function])
             for source in random.Random(f"{SEED}{question.name}").sample(
                 possible, min(EACH, len(possible))
             ):

@@ -40,15 +40,6 @@ def test_the_coefficients_are_the_stationary_kalman_gain(alpha):
 # --- the estimates
 
 
-PRIOR = {"mean": [4.0, -7.0, 3.0, 1.5], "variance": [50.0, 30.0, 9.0, 4.0]}
-
-
-def planar(**changes):
-    return kinematic(
-        **(dict(interval=T, dimensions=2, noise_sd=0.8, measurement_sd=5.0, prior=PRIOR) | changes)
-    )
-
-
 def slow_alpha_beta(measurements, alpha, beta):
     """One axis in plain floats: the first two measurements, at any distance, then the gains;
     coasting over NaN."""
@@ -72,18 +63,18 @@ def slow_alpha_beta(measurements, alpha, beta):
 
 
 def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop():
-    model, alpha, beta = planar(prior={"variance": 1e4}), 0.3, 0.07
+    model, alpha, beta = kinematic(T, dimensions=2, noise_sd=0.8, measurement_sd=5.0), 0.3, 0.07
     y = simulate(model, 4, 20, seed=3).y
     y[1, 0] = y[5:8, 1] = y[0, 2] = y[1, 2] = np.nan  # gaps in the start and later, all components
     y[1, 3, 0] = y[6, 3, 1] = np.nan  # and one component alone
-    found = run(alpha_beta(model, alpha, beta), y).mean
+    mean = run(alpha_beta(model, alpha, beta), y).mean
     for trajectory in range(4):
         for axis in range(2):
             expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta)
             for k, values in enumerate(expected):
                 if values[0] is not None:  # nothing is known before the first measurement
                     np.testing.assert_allclose(
-                        found[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING
+                        mean[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING
                     )
 
 
@@ -91,14 +82,11 @@ def test_a_growing_memory_is_the_line_through_all_measurements():
     """Small coefficients leave the growing memory in force; NumPy's least squares."""
     model = kinematic(T, dimensions=1, measurement_sd=5.0)
     y = simulate(model, 1, 30, seed=8).y
-    found = run(alpha_beta(model, 1e-3, steady_beta(1e-3)), y).mean[:, 0]
+    mean = run(alpha_beta(model, 1e-3, steady_beta(1e-3)), y).mean[:, 0]
     for k in range(1, 30):
         line = np.polynomial.Polynomial.fit(T * np.arange(k + 1), y[: k + 1, 0, 0], 1)
         expected = [line(T * k), line.deriv()(T * k)]
-        np.testing.assert_allclose(found[k], expected, rtol=1e-8, atol=1e-8)
-
-
-# --- the covariance
+        np.testing.assert_allclose(mean[k], expected, rtol=1e-8, atol=1e-8)
 
 
 # --- bad input
@@ -125,19 +113,6 @@ def test_other_models_are_refused():
         alpha_beta(Model.define(["x1 + x2", "x2 + v1"], "x1**2 + w1"), 0.3, 0.1)
 
 
-@pytest.mark.parametrize(
-    "coefficients", [(0.3, 0.0), (0.3, 3.5), (-0.1, 0.01), (2.5, 0.1), (np.nan, 0.1)]
-)
-def test_coefficients_whose_errors_grow_are_refused(coefficients):
-    with pytest.raises(ValueError, match="is unstable"):
-        alpha_beta(planar(), *coefficients)
-
-
 def test_alpha_and_index_are_inverse():
     for index in (1e-9, 1e-3, 0.2, 1.0, 50.0):
         assert tracking_index(steady_alpha(index)) == pytest.approx(index, rel=1e-9)
-    # the textbook's form of the same formula, which cancels for a small index
-    index = 0.8
-    textbook = -(index**2 + 8 * index - (index + 4) * np.sqrt(index**2 + 8 * index)) / 8
-    assert steady_alpha(index) == pytest.approx(textbook, rel=1e-14)
-    assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)

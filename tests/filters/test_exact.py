@@ -1,19 +1,18 @@
-"""The exact AOF against the Kalman filter, against closed forms, and against plain fine grids
-written here."""
+"""The exact AOF against the Kalman filter, closed forms, and sums over plain fine grids."""
 
 from functools import partial
 
-import mpmath
 import numpy as np
 import pytest
-from scipy import stats
 
 from kfcourse import Model, ModelError, filters, load_variants, run, simulate
-from kfcourse.filters import kalman_filter, particle
-from kfcourse.filters.exact import panels, pointmasses
+from kfcourse.filters import kalman_filter
+from kfcourse.filters.exact import pointmasses
 from kfcourse.filters.exact.pointmasses import Unresolved
 from kfcourse.lab.short_names import has_exact
+from kfcourse.montecarlo.experiment import states
 from kfcourse.scenarios.benchmarks import inverse_cube_root
+from kfcourse.symbolic.equations import compile_model
 
 # What these tests compare with is known to far more digits than a comparison needs.
 ACCURACY = 1e-6
@@ -29,20 +28,18 @@ def followed(model, y, accuracy=ACCURACY):
     """Means, deviations and stated errors in deviations, (steps, runs), along y (steps, runs,
     1)."""
     exact = filters.pointmass(model, accuracy)
-    state, found = exact.init(y.shape[1]), []
-    for measurement in y:
-        state = exact.step(state, measurement)
-        found.append(
-            (state.posterior.mean[:, 0], np.sqrt(state.posterior.cov[:, 0, 0]), state.memory.error)
-        )
-    return tuple(np.array(values) for values in zip(*found, strict=True))
+    rows = (
+        (state.posterior.mean[:, 0], np.sqrt(state.posterior.cov[:, 0, 0]), state.memory.error)
+        for state in states(exact, y)[1:]
+    )
+    return tuple(np.array(values) for values in zip(*rows, strict=True))
 
 
-def agrees(found, mean, sd, allowed=FLOOR, times=1.0):
+def agrees(ours, mean, sd, allowed=FLOOR, times=1.0):
     """Whether means and deviations err by no more than so many times what is stated, and is
     allowed."""
-    ours, deviation, stated = found
-    off = np.maximum(np.abs(ours - mean) / sd, np.abs(deviation / sd - 1))
+    centre, deviation, stated = ours
+    off = np.maximum(np.abs(centre - mean) / sd, np.abs(deviation / sd - 1))
     assert (off <= times * stated + allowed).all(), (off / stated).max()
 
 
@@ -50,30 +47,35 @@ def normal(x, mean, sigma):
     return np.exp(-0.5 * ((x - mean) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
 
 
-@pytest.fixture(scope="module")
-def variants():
-    return {name: variant.model for name, variant in load_variants().items()}
+VARIANTS = {name: variant.model for name, variant in load_variants().items()}
 
 
 # --- against the Kalman filter
 
 
 @pytest.mark.parametrize(
-    ("state", "meter", "prior"),
+    ("numbers", "prior", "shift"),
     [
-        ("0.9*x + 0.3*v", "x + 0.5*w", {}),
-        ("-1.1*x + 2 + 0.5*v", "3*x - 1 + 0.4*w", {"mean": 40.0, "variance": 9.0}),
-        ("x + 0.001*v", "1000*x + 2*w", {"mean": -0.3, "variance": 1e-4}),
-        ("0.9*x + 0.001*v", "x + 0.5*w", {}),  # kernels far narrower than panels
-        ("-0.9*x + 1e-6*v + 2", "x + 0.5*w", {}),
-        ("0.9*x + 0.3*v", "x + 0.5*w", {"mean": 2.0, "variance": 0.0}),
-        ("31*x + 0.1*v", "x + 0.5*w", {}),
-        ("(0.5 + k/9)*x + (1 + k)*v/9 + cos(k)", "(1 + k)*x + k + 0.5*w", {}),
+        ((0.9, 0, 0.3, 1, 0, 0.5, 0), {}, 0),
+        ((-1.1, 2, 0.5, 3, -1, 0.4, 0), {"mean": 40.0, "variance": 9.0}, 0),
+        ((1, 0, 0.001, 1000, 0, 2, 0), {"mean": -0.3, "variance": 1e-4}, 0),
+        ((0.9, 0, 0.001, 1, 0, 0.5, 0), {}, 0),  # kernels far narrower than panels
+        ((-0.9, 2, 1e-6, 1, 0, 0.5, 0), {}, 0),
+        ((0.9, 0, 0.3, 1, 0, 0.5, 0), {"mean": 2.0, "variance": 0.0}, 0),
+        ((31, 0, 0.1, 1, 0, 0.5, 0), {}, 0),
+        ((0.5, 1, 0.1, 1, 0, 0.5, 1), {}, 0),
+        ((1, 0, 0.3, 1, 0, 0.01, 0), {}, 30),  # far beyond the prior
     ],
 )
-def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior):
-    model = Model.define(state, meter, prior=prior)
-    _, y = simulate(model, 8, 6, seed=4)
+def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(numbers, prior, shift):
+    """One law for all numbers, which is compiled once; the last lets all change with time."""
+    model = Model.define(
+        "(a + c*k/9)*x + r*cos(c*k) + (1 + 9*c*k)*s*v",
+        "(h + c*k)*x + b + c*k + q*w",
+        dict(zip("arshbqc", numbers, strict=True)),
+        prior=prior,
+    )
+    y = simulate(model, 8, 6, seed=4).y + shift
     y[2, 3] = np.nan
     exact, kalman = filters.pointmass(model, 1e-5), kalman_filter(model)
     a, b, total = exact.init(8), kalman.init(8), 0.0
@@ -97,180 +99,126 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior)
 # --- against other integrations of the same equation
 
 
-def on_points(model, y, x, move, spread, see, noise):
-    """Means and deviations, (2, steps, runs), of x' = move(x) + spread(x) v, y = see(x) + noise(x) w:
-    the Stratonovich equation by sums over points at equal distances."""
-    kernel = normal(x[:, None], move(x), spread(x))
-    density, found = normal(x, model.prior.mean, np.sqrt(model.prior.cov[0]))[:, None], []
-    for measured in y[:, :, 0]:
-        density = density * normal(measured, see(x)[:, None], noise(x)[:, None])
-        density /= density.sum(axis=0)
-        mean = x @ density
-        found.append((mean, np.sqrt(x**2 @ density - mean**2)))
-        density = kernel @ density
-    return np.moveaxis(found, 1, 0)
+def parts(model, x):
+    """f(x), |g(x)|, S(x), |r(x)| of x' = f(x) + g(x) v, y = S(x) + r(x) w."""
+    for equation in compile_model(model):
+        without, noisy = (equation(x[:, None], np.full((len(x), 1), noise)) for noise in (0.0, 1.0))
+        yield from (without[:, 0], np.abs(noisy - without)[:, 0])
 
 
-def always(value):
-    return lambda x: np.full_like(x, value)
+def on_points(model, y, x, length):
+    """Means and deviations, (2, steps, runs): the Stratonovich equation by sums over points, each
+    of which has a length."""
+    move, spread, see, noise = parts(model, x)
+    kernel = normal(x[:, None], move, spread) * length[:, None] if len(y) > 1 else None
+    mass, rows = (length * normal(x, model.prior.mean, np.sqrt(model.prior.cov[0])))[:, None], []
+    for k, measured in enumerate(y[:, :, 0]):
+        mass = (kernel @ mass if k else mass) * normal(measured, see[:, None], noise[:, None])
+        mass /= mass.sum(axis=0)
+        mean = x @ mass
+        rows.append((mean, np.sqrt((mass * (x[:, None] - mean) ** 2).sum(axis=0))))
+    return np.moveaxis(rows, 1, 0)
 
 
-def same(x):
-    return x
+def evenly(least, most, step):
+    x = np.arange(least, most, step)
+    return x, np.full_like(x, step)
 
 
-SMOOTH = {  # of variants: object, its noise; meter, its noise
-    "5": (lambda x: 0.95 * x, always(0.2), np.sin, always(0.3)),
-    "7": (lambda x: 0.9 * x, always(0.3), same, lambda x: 0.3 * (1 + x**2)),
-    "11": (lambda x: x + 0.1 * (x - x**3), always(0.15), same, always(0.5)),
+def graded(*places, least, most, count):
+    """Midpoints and lengths of cells that grow in proportion to their distance from each place."""
+    way = np.append(0, np.geomspace(least, most, count))
+    edge = np.unique([place + side * way for place in places for side in (-1, 1)])
+    return 0.5 * (edge[1:] + edge[:-1]), np.diff(edge)
+
+
+# The narrowest density spans more than ten points per sigma: the sums then err by exp(-2 pi^2
+# 10^2), that is not at all.
+FINE = evenly(-9, 9, 0.009), FLOOR, (1e-3, ACCURACY)
+# Midpoints of cells 1/50 of the meter's deviation wide, none of which holds a jump, err by some
+# 1e-5; across a jump they would by 1e-2.
+MIDPOINTS = evenly(-39.99, 40, 0.02), 1e-4, (1e-3,)
+# away from 0 all is in proportion to x
+IN_PROPORTION = graded(0, least=1e-2, most=12, count=3000), FLOOR, (ACCURACY,)
+DISPLACED = {"mean": 0.5, "variance": 2.0}
+ON_POINTS = {
+    "5": FINE,
+    "7": FINE,
+    "11": FINE,
+    "53": IN_PROPORTION,
+    ("0.95*x + 0.3*v", "exp(x/2)*w"): FINE,  # stochastic volatility
+    ("0.45*(x - 1 + Abs(x + 1)) + 0.4*v", "x + 0.5*w"): MIDPOINTS,
+    ("x - 0.5*sign(x) + v", "x + w"): MIDPOINTS,  # dry friction
+    ("Heaviside(x) + v", "x + w"): MIDPOINTS,
+    ("0.9*x + (1 if x < 0 else 2)*v", "x + w"): MIDPOINTS,
+    ("0.9*x + v", "2*sign(x) + w"): MIDPOINTS,
 }
 
 
-@pytest.mark.parametrize("name", SMOOTH)
-@pytest.mark.parametrize("accuracy", [1e-3, ACCURACY])
-def test_it_equals_a_dense_uniform_grid(variants, name, accuracy):
-    """The narrowest density here spans more than ten nodes per sigma: the sums then err by exp(-2
-    pi^2 10^2), that is not at all."""
-    y = simulate(variants[name], 5, 10, seed=8).y
-    expected = on_points(variants[name], y, np.linspace(-9, 9, 2001), *SMOOTH[name])
-    agrees(followed(variants[name], y, accuracy), *expected)
-
-
-JUMPING = {
-    # dry friction
-    "x - 0.5*sign(x) + v": (lambda x: x - 0.5 * np.sign(x), always(1), same, always(1)),
-    "0.8*x + 3*sign(x) + v": (lambda x: 0.8 * x + 3 * np.sign(x), always(1), same, always(1)),
-    "Heaviside(x) + v": (lambda x: np.heaviside(x, 0.5), always(1), same, always(1)),
-    "0.9*x + (1 if x < 0 else 2)*v": (
-        lambda x: 0.9 * x,
-        lambda x: np.where(x < 0, 1.0, 2.0),
-        same,
-        always(1),
-    ),
-    "0.9*x + v": (lambda x: 0.9 * x, always(1), lambda x: 2 * np.sign(x), always(1)),
-}
-
-
-@pytest.mark.parametrize("state", JUMPING)
-def test_panels_are_split_where_the_object_or_the_meter_jumps(state):
-    """Midpoints of cells 1/50 of the meter's deviation wide, none of which holds the jump at 0, err
-    by some 1e-5; across a jump they would by 1e-2."""
-    meter = "2*sign(x) + w" if state == "0.9*x + v" else "x + w"
-    model = Model.define(state, meter, prior={"mean": 0.5, "variance": 2.0})
-    y = simulate(model, 12, 5, seed=1).y
-    expected = on_points(model, y, np.arange(-40, 40, 0.02) + 0.01, *JUMPING[state])
-    agrees(followed(model, y, 1e-3), *expected, allowed=1e-4)
-
-
-@pytest.mark.parametrize("f", [0.02, 0.2])
-@pytest.mark.parametrize("y", [2.0, -1.3, 0.4, 0.01, -0.055])
-def test_on_variant_53_the_first_posterior_is_prior_times_likelihood(variants, f, y):
-    width = f * y * y
-
-    def density(x):
-        x = mpmath.mpf(x)
-        return (
-            mpmath.exp(-x * x / 2 - ((y - x) / (f * x * x)) ** 2 / 2) / (x * x)
-            if x
-            else mpmath.mpf(0)
-        )
-
-    steps = [width * 2.0**j for j in range(-2, 40) if width * 2.0**j < 40]
-    points = sorted({-40.0, 0.0, y, 40.0, *(y + s for s in steps), *(y - s for s in steps)})
-    with mpmath.workdps(30):
-        total = mpmath.quad(density, points)
-        expected = mpmath.quad(lambda x: x * density(x), points) / total
-        variance = mpmath.quad(lambda x: (x - expected) ** 2 * density(x), points) / total
-    agrees(
-        followed(variants["53"].replace(f=f), np.array([[[y]]])),
-        float(expected),
-        float(variance) ** 0.5,
-    )
-
-
-def test_on_variant_53_it_equals_a_grid_that_moves_with_the_measurement(variants):
-    # Away from 0 the posterior lies within a few f y^2 of y: 2001 nodes over 15 of them, rectangles
-    # as above.
-    c, e, f = 0.9, 0.05, 0.02
-    rng = np.random.default_rng(2)
-    x, y, expected = 1.5, [], []
-    for _ in range(6):
-        y.append(x + f * x * x * rng.normal())
-        x = x * (c + e * rng.normal())
-    before, masses = None, None
-    for value in y:
-        x = value + np.linspace(-15, 15, 2001) * f * value * value
-        predicted = (
-            normal(x, 0, 1)
-            if before is None
-            else normal(x[:, None], c * before, e * np.abs(before)) @ masses
-        )
-        masses = predicted * normal(value, x, f * x * x)
-        masses /= masses.sum()
-        before, centre = x, masses @ x
-        expected.append((centre, np.sqrt(masses @ (x - centre) ** 2)))
-    agrees(followed(variants["53"], np.array(y)[:, None, None]), *np.array(expected).T[:, :, None])
-
-
-def test_panels_are_split_where_no_state_explains_the_measurement():
-    """y = x^2 + 0.001 w came out at -0.0005: no zero of y - x^2 leads to the posterior, 70 times
-    narrower than a panel.
-
-    Prior times likelihood by the trapezium rule, which for a smooth density that vanishes at the
-    ends converges faster than any power of the step; here 0.02 wide, with steps of 1e-5.
-    """
-    model = Model.define("x + v", "x**2 + 0.001*w", prior={"mean": 0.3})
-    x = np.linspace(-0.3, 0.3, 60_001)
-    density = np.exp(-0.5 * (x - 0.3) ** 2 - 0.5 * ((-0.0005 - x**2) / 0.001) ** 2)
-    mean = (density @ x) / density.sum()
-    sd = np.sqrt(density @ (x - mean) ** 2 / density.sum())
-    agrees(followed(model, np.array([[[-0.0005]]])), mean, sd)
+@pytest.mark.parametrize("case", ON_POINTS)
+def test_it_equals_a_dense_grid(case):
+    """Panels are split where the object or the meter jumps."""
+    model = VARIANTS[case] if isinstance(case, str) else Model.define(*case, prior=DISPLACED)
+    y, (points, allowed, accuracies) = simulate(model, 60, 6, seed=8).y, ON_POINTS[case]
+    # the grid of variant 53 ends before 0
+    y = y[:, np.abs(y[..., 0]).min(axis=0) > 0.4][:, :4] if case == "53" else y[:, :8]
+    expected = on_points(model, y, *points)
+    for accuracy in accuracies:
+        agrees(followed(model, y, accuracy), *expected, allowed=allowed)
 
 
 @pytest.mark.parametrize(
-    ("state", "mean", "variance"),
+    ("model", "values"),
     [
-        ("x**2 + v", 1.0, 3.0),
-        ("sin(x) + 0.5*v", 0.0, (1 - np.exp(-2)) / 2 + 0.25),
-        ("exp(x/4) + 0.3*v", np.exp(1 / 32), np.exp(1 / 8) - np.exp(1 / 16) + 0.09),
-        ("9*x + 0.2*v", 0.0, 81.04),
-        ("x + x*v", 0.0, 2.0),
-        ("sin(3*x) + 0.1*v", 0.0, (1 - np.exp(-18)) / 2 + 1e-2),
-        ("x**2 - 1 + 0.01*v", 0.0, 2 + 1e-4),
+        (VARIANTS["53"].replace(f=0.02), [2.0, -1.3, 0.4, 0.01, -0.055]),
+        (VARIANTS["53"].replace(f=0.2), [2.0, -1.3, 0.4, 0.01, -0.055]),
+        # no state explains it: no zero of y - x^2 leads to the posterior, 70 times narrower than a
+        # panel
+        (Model.define("x + v", "x**2 + 0.001*w", prior={"mean": 0.3}), [-0.0005]),
+        (Model.define("x + v", "w/x"), [0.7, -1.2, 0.1, 2.0]),  # two humps
     ],
 )
-def test_a_prediction_has_the_moments_of_the_closed_form(state, mean, variance):
+def test_the_first_posterior_is_prior_times_likelihood(model, values):
+    """By midpoints of cells a thousandth as long as their distance from 0 and from y."""
+    for y in np.reshape(values, (-1, 1, 1, 1)):
+        points = graded(0.0, y.item(), least=1e-9, most=40, count=20_000)
+        agrees(followed(model, y), *on_points(model, y, *points))
+
+
+def of_squares(c, e):
+    """Variances of the second and third state of x' = c x + e x^2 v, a noise that vanishes:
+    M x'^2 = c^2 M x^2 + e^2 M x^4, and M x'^4 = c^4 M x^4 + 6 c^2 e^2 M x^6 + 3 e^4 M x^8, where of
+    the first state M x^2, x^4, x^6, x^8 = 1, 3, 15, 105."""
+    square, fourth = c**2 + 3 * e**2, 3 * c**4 + 90 * c**2 * e**2 + 315 * e**4
+    return square, c**2 * square + e**2 * fourth
+
+
+@pytest.mark.parametrize(
+    ("state", "mean", "variance", "second"),
+    [
+        ("x**2 + v", 1.0, 3.0, None),
+        ("sin(x) + 0.5*v", 0.0, (1 - np.exp(-2)) / 2 + 0.25, None),
+        ("exp(x/4) + 0.3*v", np.exp(1 / 32), np.exp(1 / 8) - np.exp(1 / 16) + 0.09, None),
+        ("9*x + 0.2*v", 0.0, 81.04, 6564.28),
+        ("x + x*v", 0.0, 2.0, 4.0),
+        ("sin(3*x) + 0.1*v", 0.0, (1 - np.exp(-18)) / 2 + 1e-2, None),
+        ("x**2 - 1 + 0.01*v", 0.0, 2 + 1e-4, None),
+        ("1.05*x + 0.01*x**2*v", 0.0, *of_squares(1.05, 0.01)),
+        ("x + 0.001*x**2*v", 0.0, *of_squares(1.0, 0.001)),
+    ],
+)
+def test_a_prediction_has_the_moments_of_the_closed_form(state, mean, variance, second):
     """The density of the next state, not only the moments: the second state without a measurement
-    is drawn from it."""
+    is drawn from it, and the variance of the third where it is known."""
     exact, nothing = pointmass(Model.define(state, "x + w")), np.full((1, 1), np.nan)
     first = exact.step(exact.init(1), nothing)
-    second = exact.step(first, nothing)
-    for law in (first.predicted, second.posterior):
-        assert abs(law.mean[0, 0] - mean) <= (second.memory.error[0] + FLOOR) * np.sqrt(variance)
-        assert abs(law.cov[0, 0, 0] / variance - 1) <= 2 * (second.memory.error[0] + FLOOR)
-
-
-@pytest.mark.parametrize(("c", "e"), [(1.05, 0.01), (1.0, 0.001)])
-def test_a_noise_that_vanishes_at_a_state_has_the_moments_of_the_closed_form(c, e):
-    """x' = c x + e x^2 v.  Without measurements M x' = 0, M x'^2 = c^2 M x^2 + e^2 M x^4, and of
-    x_1 ~ c x + e x^2 v
-
-    M x_1^4 = c^4 M x^4 + 6 c^2 e^2 M x^6 + 3 e^4 M x^8, where M x^2, x^4, x^6, x^8 = 1, 3, 15, 105.
-    """
-    exact, nothing = (
-        pointmass(Model.define("c*x + e*x**2*v", "x + w", {"c": c, "e": e})),
-        np.full((1, 1), np.nan),
-    )
-    first = exact.step(exact.init(1), nothing)
-    second = exact.step(first, nothing)
-    square = c**2 + 3 * e**2
-    fourth = 3 * c**4 + 90 * c**2 * e**2 + 315 * e**4
-    np.testing.assert_allclose(first.predicted.cov[0, 0, 0], square, rtol=1e-6)
-    np.testing.assert_allclose(second.posterior.cov[0, 0, 0], square, rtol=1e-5)
-    # x^2 = 50 where the density has 1e-11 of its mass, which may be cut off
-    np.testing.assert_allclose(
-        second.predicted.cov[0, 0, 0], c**2 * square + e**2 * fourth, rtol=1e-5
-    )
+    then = exact.step(first, nothing)
+    allowed = then.memory.error[0] + FLOOR
+    for law in (first.predicted, then.posterior):
+        assert abs(law.mean[0, 0] - mean) <= allowed * np.sqrt(variance)
+        assert abs(law.cov[0, 0, 0] / variance - 1) <= 2 * allowed
+    if second:
+        assert abs(then.predicted.cov[0, 0, 0] / second - 1) <= 2 * allowed
 
 
 def test_a_kernel_that_is_narrow_here_and_folds_there():
@@ -286,8 +234,7 @@ def test_a_kernel_that_is_narrow_here_and_folds_there():
     weight *= np.exp(-0.5 * ((1.3 - after) / 0.5) ** 2)
     mean = (weight * after).sum() / weight.sum()
     sd = np.sqrt((weight * (after - mean) ** 2).sum() / weight.sum())
-    found = [part[1:] for part in followed(model, np.array([[[0.4]], [[1.3]]]))]
-    agrees(found, mean, sd)
+    agrees([part[1:] for part in followed(model, np.array([[[0.4]], [[1.3]]]))], mean, sd)
 
 
 def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
@@ -298,9 +245,7 @@ def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
     20, are 1/75 apart.
     """
     first, then = 0.5, np.array([20.0, -30.0, 1.0, 7.0])
-    edge = np.geomspace(1e-6, 12.0, 8000)
-    x, length = 0.5 * (edge[1:] + edge[:-1]), np.diff(edge)
-    x, length = np.concatenate([-x, x]), np.concatenate([length, length])
+    x, length = graded(0, least=1e-6, most=12.0, count=8000)
     mass = length * np.exp(-0.5 * (x - 3.01) ** 2 - 0.5 * (x - first) ** 2)
     expected = []
     for measured in then:
@@ -312,11 +257,12 @@ def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
         )
         p /= p.sum()
         expected.append((p @ there, np.sqrt(p @ (there - p @ there) ** 2)))
-    found = followed(inverse_cube_root(), np.stack([np.full(4, first), then])[:, :, None], 1e-3)
-    agrees([part[1] for part in found], *np.array(expected).T, allowed=1e-3)
+    y = np.stack([np.full(4, first), then])[:, :, None]
+    ours = [part[1] for part in followed(inverse_cube_root(), y, 1e-3)]
+    agrees(ours, *np.array(expected).T, allowed=1e-3)
 
 
-# --- rough densities: a finer filter, and many particles
+# --- rough densities: a finer filter
 
 
 @pytest.mark.parametrize(
@@ -326,7 +272,6 @@ def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
         ("0.9*x + 0.5*sin(x)*v", "x + 0.3*w"),
         ("0.9*x + 0.3*x*v", "x + 0.3*(1 + x**2)*w"),
         ("0.95*x + 0.3*v", "0.1*x + sin(x)*w"),
-        ("0.45*(x - 1 + Abs(x + 1)) + 0.4*v", "x + 0.5*w"),
     ],
 )
 def test_where_densities_are_rough_the_stated_error_holds(state, meter):
@@ -337,36 +282,9 @@ def test_where_densities_are_rough_the_stated_error_holds(state, meter):
     assert ours[2].max() < 0.02
 
 
-def test_stochastic_volatility_is_what_many_particles_find():
-    """Twenty clouds of 10,000 particles that do not look at the measurement: within 4 of their
-    standard errors."""
-    model = Model.define("0.95*x + 0.3*v", "exp(x/2)*w")
-    _, y = simulate(model, 2, 6, seed=4)
-    expected = run(pointmass(model), y)
-    found = [run(particle(model, 10_000, seed, guided=False), y) for seed in range(20)]
-    for kind in ("mean", "cov"):
-        values = np.stack([getattr(law, kind).reshape(6, 2) for law in found])
-        error = values.std(axis=0, ddof=1) / np.sqrt(20)
-        assert (
-            abs(values.mean(axis=0) - getattr(expected, kind).reshape(6, 2)) < 4 * error
-        ).all(), kind
-
-
-def test_a_precision_with_a_chi_square_prior_has_a_gamma_posterior():
-    """y = w / x: p(x | y) = C |x| exp(-x^2 (1 + y^2) / 2), so that x^2 ~ Gamma(1, scale 2 / (1 +
-    y^2)), and two humps."""
-    y = np.array([0.7, -1.2, 0.1, 2.0, 0.3])
-    expected = [np.sqrt(stats.gamma(1, scale=2 / (1 + value**2)).mean()) for value in y]
-    agrees(
-        [part[0] for part in followed(Model.define("x + v", "w/x"), y[None, :, None], 1e-4)],
-        0.0,
-        np.array(expected),
-    )
-
-
 @pytest.mark.parametrize("f", [0.02, 0.2])  # the lab's meter, and one ten times worse
-def test_what_it_states_is_far_finer_than_what_trajectories_could_see(variants, f):
-    model = variants["53"].replace(f=f)
+def test_what_it_states_is_far_finer_than_what_trajectories_could_see(f):
+    model = VARIANTS["53"].replace(f=f)
     _, _, stated = followed(model, simulate(model, 250, 12, 3).y)
     assert np.median(stated) < 1e-4 and stated.max() < 1 / np.sqrt(250)
     assert (np.diff(stated, axis=0, prepend=0.0) >= 0).all()  # as if it never forgot an error
@@ -375,25 +293,24 @@ def test_what_it_states_is_far_finer_than_what_trajectories_could_see(variants, 
 # --- measurements that are odd or impossible, threads
 
 
-@pytest.mark.parametrize("name", ["53", "1", "2", "5", "7", "10", "11", "12"])
-@pytest.mark.parametrize("value", [0.0, -0.0, 1e3, -1e3, 1e-12])
-def test_an_odd_measurement_is_followed_or_refused(variants, name, value):
+@pytest.mark.parametrize("name", ["53", "1", "2", "7", "10", "12"])
+@pytest.mark.parametrize("value", [-0.0, 1e3, 1e-12])
+def test_an_odd_measurement_is_followed_or_refused(name, value):
     """What is stated holds against a filter of a thousandth of the error, or there is a
     sentence."""
-    _, y = simulate(variants[name], 2, 4, seed=1)
-    y = y.copy()
+    y = simulate(VARIANTS[name], 2, 4, seed=1).y
     y[1] = value
     try:
-        found = followed(variants[name], y, 1e-3)
-        mean, sd, _ = followed(variants[name], y)
+        coarse = followed(VARIANTS[name], y, 1e-3)
+        mean, sd, _ = followed(VARIANTS[name], y)
     except Unresolved as error:
         assert "step 1" in str(error) or "step 2" in str(error)
         return
-    agrees(found, mean, sd)
+    agrees(coarse, mean, sd)
 
 
-@pytest.mark.parametrize("y", [-1000.0, -100.0, -20.0, -6.0, -3.0, -1.0])
-def test_a_record_that_contradicts_the_model_has_the_right_answer_or_none(variants, y):
+@pytest.mark.parametrize("y", [-1000.0, -20.0, -6.0, -3.0])
+def test_a_record_that_contradicts_the_model_has_the_right_answer_or_none(y):
     """Variant 11, x' = x + .1 (x - x^3) + .15 v, y = x + .5 w, after a first y of .9: a grid of
     logarithms cannot underflow."""
     x = np.linspace(-12, 6, 3601)
@@ -405,13 +322,13 @@ def test_a_record_that_contradicts_the_model_has_the_right_answer_or_none(varian
     p /= p.sum()
     sd = np.sqrt(p @ (x - p @ x) ** 2)
     try:
-        found = [part[1] for part in followed(variants["11"], np.array([[[0.9]], [[y]]]), 1e-3)]
+        ours = [part[1] for part in followed(VARIANTS["11"], np.array([[[0.9]], [[y]]]), 1e-3)]
     except Unresolved as error:
         assert y <= -6 and (
             "contradicts the model" in str(error) or "no state explains" in str(error)
         )
     else:
-        agrees(found, p @ x, sd, allowed=1e-5)
+        agrees(ours, p @ x, sd)
         assert y >= -6
 
 
@@ -436,20 +353,14 @@ def test_it_knows_where_a_linear_record_leaves_its_prediction():
     assert 3 <= refused[0] < 8
 
 
-def test_a_measurement_far_beyond_the_prior_is_followed():
-    model, y = Model.define("0.9*x + 0.3*v", "x + 0.01*w"), np.array([[[30.0]], [[26.0]]])
-    expected = run(kalman_filter(model), y)
-    agrees(followed(model, y), expected.mean[..., 0], np.sqrt(expected.cov[..., 0, 0]))
-
-
-def test_one_trajectory_gives_the_same_numbers_as_many_and_as_in_threads(variants, monkeypatch):
-    _, y = simulate(variants["5"], 150, 5, seed=1)
-    together = run(pointmass(variants["5"]), y)
-    alone = run(pointmass(variants["5"]), y[:, 140:141])
+def test_one_trajectory_gives_the_same_numbers_as_many_and_as_in_threads(monkeypatch):
+    _, y = simulate(VARIANTS["5"], 150, 5, seed=1)
+    together = run(pointmass(VARIANTS["5"]), y)
+    alone = run(pointmass(VARIANTS["5"]), y[:, 140:141])
     assert np.array_equal(together.mean[:, 140:141], alone.mean)
     for threads in (1, 3):
         monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", threads)
-        again = run(pointmass(variants["5"]), y)
+        again = run(pointmass(VARIANTS["5"]), y)
         assert np.array_equal(again.mean, together.mean) and np.array_equal(again.cov, together.cov)
 
 
@@ -462,7 +373,10 @@ def test_one_trajectory_gives_the_same_numbers_as_many_and_as_in_threads(variant
         (["x1 + v1", "x2 + v2"], "x1 + w", "scalar.*dimension 2.*particle"),
         (["x"], ["x + w1", "x + w2"], "state has dimension 1, the measurement 2: use particle"),
         ("x + v**2", "x + w", "noise enters nonlinearly.*gauss_hermite"),
-        ("x + v", "x + w**3", "noise enters nonlinearly.*gauss_hermite"),
+        *(
+            ("x + v", meter, "noise enters nonlinearly.*gauss_hermite")
+            for meter in ("x + w**3", "x + w**2", "x + sin(w)", "exp(w*x) + w")
+        ),
         ("x*exp(v)", "x + w", "noise enters nonlinearly.*gauss_hermite"),
         ("0.9*x + v", "x**2", "no noise enters the meter"),
         ("0.9*x", "x + w", "no noise enters the object"),
@@ -493,12 +407,9 @@ def test_what_cannot_be_resolved_is_refused_in_words(state, meter):
         run(pointmass(model), y)
 
 
-def test_what_its_memory_shows_is_a_density(variants):
-    exact = pointmass(variants["53"])
-    _, y = simulate(variants["53"], 3, 3, seed=1)
-    state = exact.init(3)
-    for measurement in y:
-        state = exact.step(state, measurement)
+def test_what_its_memory_shows_is_a_density():
+    exact = pointmass(VARIANTS["53"])
+    state = states(exact, simulate(VARIANTS["53"], 3, 3, seed=1).y)[-1]
     for i in range(3):
         x, p = state.memory.density(i)
         assert (np.diff(x) >= 0).all() and (p >= 0).all()
@@ -507,21 +418,6 @@ def test_what_its_memory_shows_is_a_density(variants):
         assert np.trapezoid(p * x, x) == pytest.approx(state.posterior.mean[i, 0], rel=0.02)
 
 
-# --- its parts
-
-
-def test_the_last_coefficients_of_legendre_tell_how_a_panel_is_resolved():
-    coefficients = np.arange(1.0, panels.Q + 1)
-    values = np.polynomial.legendre.legval(panels.POINT, coefficients)
-    np.testing.assert_allclose(
-        [panels.LAST_BUT_ONE @ values, panels.LAST @ values], coefficients[-2:], rtol=1e-12
-    )
-    np.testing.assert_allclose(
-        np.polynomial.polynomial.polyval(panels.POINT, panels.POWER @ values), values, rtol=1e-12
-    )
-    np.testing.assert_allclose(panels.SLOPE @ panels.POINT**3, 3 * panels.POINT**2, atol=1e-12)
-
-
-def test_a_law_is_printed_once_for_all_numbers(variants):
-    model = variants["53"]
+def test_a_law_is_printed_once_for_all_numbers():
+    model = VARIANTS["53"]
     assert pointmasses.printed(model) == pointmasses.printed(model.replace(f=0.3))

@@ -5,15 +5,23 @@ from functools import partial
 import numpy as np
 import pytest
 import sympy as sp
-from test_every_filter import LINEAR, OF_MEASUREMENTS, STRUCTURES, exact_ensemble
+from test_every_filter import OF_MEASUREMENTS, STRUCTURES
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
-from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS, dfmp, fbp, fos, mdfmp, mfos
+from kfcourse.filters.optimal_structure import (
+    ESTIMATES,
+    MEASUREMENTS,
+    dfmp,
+    fbp,
+    fkp,
+    fos,
+    mdfmp,
+    mfos,
+)
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
 from kfcourse.montecarlo.experiment import run
@@ -117,11 +125,9 @@ def structural_values(model, structure):
     def value(function, mean, cov, which, columns=None):
         def of(values):
             size = len(values[mean])
-            found = function(values[mean][..., 0], values[cov] if cov else np.eye(n))[which]
-            return np.broadcast_to(
-                found[..., None] if columns is None else found,
-                (size, found.shape[-1 if columns is None else -2], columns or 1),
-            )
+            part = function(values[mean][..., 0], values[cov] if cov else np.eye(n))[which]
+            part = part[..., None] if columns is None else part
+            return np.broadcast_to(part, (size, part.shape[-2], columns or 1))
 
         return of
 
@@ -195,23 +201,6 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
         lam, estimates = printed[s.lam_next], [printed[s.z]]
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("columns", [1, 2, 3])
-def test_every_equation_is_printed_once_and_in_order(family, columns):
-    equations = EQUATIONS[family]
-    rows = s.latex(equations, columns).splitlines()[1:-1]
-    assert [row.count("&=") for row in rows[:-1]] == [columns] * (len(rows) - 1)
-    one_by_one = [s.latex([equation]).splitlines()[1] for equation in equations]
-    assert " ".join(rows).replace(r" &\qquad", "").replace(r" \\", "") == " ".join(one_by_one)
-
-
-# ---------------------------------------------------------------- missing measurements and
-# degenerate cases
-
-
-# ---------------------------------------------------------------- designs
-
-
 def test_a_designed_filter_stops_where_its_design_does(variant53):
     (filter_,) = design([duof(variant53)], Ensemble(variant53, 40, 8, seed=21))
     with pytest.raises(ValueError, match=r"designed for 8 steps.*to run step 9"):
@@ -224,19 +213,9 @@ def test_a_design_on_trajectories_that_diverge_says_so(variant53):
         design([duof(variant53)], broken)
 
 
-@pytest.mark.parametrize("family", [fos, mfos])
-def test_without_a_measurement_three_arguments_predict_from_the_prediction(family):
-    """In place of a missing y stands h = M[y | prediction], the value that leaves z = lambda; so u
-    = lambda.
-
-    At k = 0 of a linear model z is an affine function of y, and the regression of x on (y, z) is
-    exact wherever the pair lies on that line: x ~ z.  (h, lambda) lies there, at innovation 0; (0,
-    lambda) does not.
-    """
-    one = LINEAR["n=2, p=2"]
-    model = one.model()
-    (filter_,) = design([family(linearised(model), 3)], [exact_ensemble(one, 1, seed=3)[0]])
-    state = filter_.step(filter_.init(1), np.full((1, 2), np.nan))
-    expected = kalman_filter(model).step(kalman_filter(model).init(1), np.full((1, 2), np.nan))
-    # regressions on singular covariances, as in the theorem above
-    np.testing.assert_allclose(state.predicted.mean, expected.predicted.mean, rtol=1e-9, atol=1e-9)
+def test_a_longer_memory_holds_no_more_than_there_is():
+    model = PRINTED["p=1"]()
+    y = simulate(model, 5, 4, seed=4).y
+    plans = [fkp(linearised(model), size) for size in (4, 40)]
+    short, long = (run(filter_, y).mean for filter_ in design(plans, Ensemble(model, 300, 4, 3)))
+    np.testing.assert_array_equal(short, long)

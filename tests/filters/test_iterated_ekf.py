@@ -51,7 +51,7 @@ def test_the_printed_equations_are_the_filter(ranges, build):
             values[symbol] = np.broadcast_to(value, (3, *value.shape[-2:]))
         printed = Interpreter(values, {}).execute(EQUATIONS)
         z, p = printed[Z_NEXT], printed[P_NEXT]
-    found = run(iterated(structure, rounds), y)
+    law = run(iterated(structure, rounds), y)
     # the printed forms lose a few digits where the meter is sharper than the prior
-    np.testing.assert_allclose(found.mean[0], z[..., 0], rtol=1e-10)
-    np.testing.assert_allclose(found.cov[0], p, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(law.mean[0], z[..., 0], rtol=1e-10)
+    np.testing.assert_allclose(law.cov[0], p, rtol=1e-9, atol=1e-12)

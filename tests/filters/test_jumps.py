@@ -8,7 +8,7 @@ import numpy as np
 import oracles
 import pytest
 from scipy.stats import multivariate_normal, norm
-from test_filters import LINEAR, exact_ensemble
+from test_every_filter import LINEAR, exact_ensemble
 from test_multiple_models import follow
 from test_particles import histories
 
@@ -41,16 +41,12 @@ SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10
 LASTING, FIRST = [[0.9, 0.1], [0.3, 0.7]], [0.8, 0.2]
 
 
-def failing(modes=SENSOR, transition=LASTING, first=FIRST):
-    return JumpModel.define(
-        "0.9*x + s*v",
-        "x + C*w",
-        {"s": 0.7},
-        modes=modes,
-        transition=transition,
-        first=first,
-        prior={"mean": 3, "variance": 4},
-    )
+def failing(
+    modes=SENSOR, transition=LASTING, first=FIRST, state="0.9*x + 0.7*v", mean=3, variance=4
+):
+    """A sensor that fails."""
+    chain = {"modes": modes, "transition": transition, "first": first}
+    return JumpModel.define(state, "x + C*w", **chain, prior={"mean": mean, "variance": variance})
 
 
 AFFINE = JumpModel.define(
@@ -83,7 +79,7 @@ CURVED = JumpModel.define(
 
 
 def of(build, model, kind=gaussian):
-    return build([kind(mode) for mode in model.modes], model.transition_at, model.first)
+    return build([kind(mode) for mode in model.modes], model)
 
 
 # --- the exact filter
@@ -113,9 +109,9 @@ def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
     model = Model.define("x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w")
     y = simulate(model, 5, 20, seed=4).y
     y[3, 0] = np.nan
-    found, expected = run(build([kind(model)], [[1.0]]), y), run(aof(kind(model)), y)
-    np.testing.assert_array_equal(found.mean, expected.mean)
-    np.testing.assert_array_equal(found.cov, expected.cov)
+    ours, expected = run(build([kind(model)], [[1.0]]), y), run(aof(kind(model)), y)
+    np.testing.assert_array_equal(ours.mean, expected.mean)
+    np.testing.assert_array_equal(ours.cov, expected.cov)
 
 
 def test_what_is_merged_when():
@@ -145,7 +141,7 @@ def test_a_mode_that_no_measurement_believes_does_not_take_the_filter_away():
     model = find_variant("J3").model
     y = simulate(model, 300, 25, seed=1).y
     both = [run(of(build, model, linearised), y) for build in (gpb2, logic_dynamic)]
-    assert all(np.isfinite(one.mean).all() and np.isfinite(one.cov).all() for one in both)
+    assert all(np.isfinite(part).all() for law in both for part in law)
     spread = np.sqrt(np.diagonal(both[1].cov, axis1=-2, axis2=-1))
     assert (np.abs(both[0].mean - both[1].mean) < 1e-6 * spread).all()
 
@@ -155,8 +151,8 @@ def test_a_chain_that_changes_with_time():
     model = failing(transition=[["Heaviside(3.5 - k)", "Heaviside(k - 3.5)"], [0, 1]], first=[1, 0])
     y = simulate(model, 3, 10, seed=1)
     assert (y.mode == (np.arange(10) >= 5)[:, None]).all()
-    for one in (of(logic_dynamic, model), of(gpb2, model), pointmass(model)):
-        probability = follow(one, y.y)[2]
+    for filter_ in (of(logic_dynamic, model), of(gpb2, model), pointmass(model)):
+        probability = follow(filter_, y.y)[2]
         np.testing.assert_allclose(
             probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12
         )
@@ -168,7 +164,7 @@ def test_a_chain_that_changes_with_time():
 # What each remembers of (y_k, y_k-1, ...), (z_k, z_k-1, ...).
 REMEMBERING = {
     "fos": (logic_dynamic_fos, (0, 1)),
-    "fkp": (partial(logic_dynamic_fkp, memory=3), (3, 0)),
+    "fkp": (partial(logic_dynamic_fkp, memory=5), (5, 0)),
     "fbp": (partial(logic_dynamic_fbp, memory=3), (0, 3)),
 }
 
@@ -176,39 +172,34 @@ REMEMBERING = {
 def in_each_mode(block, modes):
     """Each trajectory once in each mode."""
     mode = np.repeat(np.arange(modes), len(block.x))
-    return Instant(*(np.concatenate([one] * modes) for one in block[:3]), mode, mode)
+    return Instant(*(np.concatenate([part] * modes) for part in block[:3]), mode, mode)
 
 
 @pytest.mark.parametrize("modes", CHAINS)
-@pytest.mark.parametrize("family", ["fos", "fkp", "fbp"])
+@pytest.mark.parametrize("family", REMEMBERING)
 def test_without_jumps_a_linear_model_has_its_kalman_filter(family, modes):
     """With moments that are exact, and a memory that holds all there is; rounding as for the
     filters without modes."""
-    one, steps = LINEAR["n=2, p=2"], 5
-    plain = one.model()
+    system, steps = LINEAR["n=2, p=2"], 5
+    plain = system.model()
     model = replace(CHAINS[modes], modes=(plain,) * modes)
-    build = {
-        "fos": logic_dynamic_fos,
-        "fkp": partial(logic_dynamic_fkp, memory=steps),
-        "fbp": logic_dynamic_fbp,
-    }[family]
-    moments = [in_each_mode(moment, modes) for moment in exact_ensemble(one, steps, seed=3)]
-    (found,) = design([build(model, [gaussian(plain)] * modes)], moments)
+    build, _ = REMEMBERING[family]
+    moments = [in_each_mode(moment, modes) for moment in exact_ensemble(system, steps, seed=3)]
+    (filter_,) = design([build(model, [gaussian(plain)] * modes)], moments)
     y = simulate(plain, 4, steps, seed=8).y
-    expected = run(kalman_filter(plain), y)
-    np.testing.assert_allclose(run(found, y).mean, expected.mean, rtol=1e-8, atol=1e-8)
-    np.testing.assert_allclose(run(found, y).cov, expected.cov, rtol=1e-8, atol=1e-8)
+    for ours, expected in zip(run(filter_, y), run(kalman_filter(plain), y), strict=True):
+        np.testing.assert_allclose(ours, expected, rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize("family", REMEMBERING)
 def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family):
     """The note's equations by hand: regressions and normal laws over the trajectories of each mode,
-    for a scalar sensor."""
+    for a scalar sensor; a measurement that is missing is remembered as what all modes expect."""
     with_modes, (measurements, estimates) = REMEMBERING[family]
     model, runs, steps = failing(), 500, 6
     blocks = list(Ensemble(model, runs, steps, seed=3))
-    (one,) = design([with_modes(model, [gaussian(mode) for mode in model.modes])], blocks)
-    state, c = one.init(runs), np.tile(model.first, (runs, 1))
+    (filter_,) = design([with_modes(model, [gaussian(mode) for mode in model.modes])], blocks)
+    state, c = filter_.init(runs), np.tile(model.first, (runs, 1))
     m, d = np.full((2, runs), 3.0), np.full((2, runs), 4.0)
     variance, pi, ys, zs = np.array([1.0, 100.0]), np.array(LASTING), [], []
     for k, block in enumerate(blocks):
@@ -216,7 +207,12 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
         L = norm.pdf(y, m, np.sqrt(d + variance[:, None]))
         mu = c.T * L / (c.T * L).sum(axis=0)
         z = (mu * (m + d / (d + variance[:, None]) * (y - m))).sum(axis=0)
-        state = one.step(state, block.y)
+        gap = filter_.step(state, np.where(np.arange(runs)[:, None] == 7, np.nan, block.y))
+        expected = np.full(1 + bool(measurements), (c.T * m).sum(axis=0)[7])
+        memory = gap.memory.kept.measurements[:1]
+        holes = [gap.posterior.mean[7, 0], *(row[7, 0] for row in memory)]
+        np.testing.assert_allclose(holes, expected, rtol=1e-7)
+        state = filter_.step(state, block.y)
         np.testing.assert_allclose(state.posterior.mean[:, 0], z, rtol=1e-7)
         np.testing.assert_allclose(state.memory.probability, mu.T, rtol=1e-6, atol=1e-9)
         ys, zs = [y, *ys], [z, *zs]
@@ -238,25 +234,6 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
             tau = 0.9 * u
             m[j] = (w * tau).sum(axis=0)
             d[j] = (w * (0.81 * T[:, None] + 0.49 + (tau - m[j]) ** 2)).sum(axis=0)
-
-
-def test_a_missing_measurement_is_remembered_as_what_all_modes_expect():
-    model = failing()
-    structures = [gaussian(mode) for mode in model.modes]
-    (one,) = design([logic_dynamic_fkp(model, structures, 2)], Ensemble(model, 500, 4, seed=3))
-    y = simulate(model, 5, 4, seed=4).y
-    y[2, 1] = np.nan
-    state = one.init(5)
-    for measured in y[:3]:
-        before, state = state, one.step(state, measured)
-    np.testing.assert_array_equal(
-        state.memory.kept.measurements[0][[0, 2, 3, 4]], y[2][[0, 2, 3, 4]]
-    )
-    expected = sum(
-        before.memory.expected[1, j] * before.memory.predicted[j].mean[1] for j in (0, 1)
-    )
-    np.testing.assert_allclose(state.memory.kept.measurements[0][1], expected, rtol=1e-12)
-    np.testing.assert_allclose(state.posterior.mean[1], expected, rtol=1e-12)
 
 
 def test_a_design_without_a_trajectory_in_a_mode_says_so():

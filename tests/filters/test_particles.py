@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.special import logsumexp
 from test_multiple_models import matrices
 
-from kfcourse import JumpModel, Model, load_variants, run, simulate
+from kfcourse import JumpModel, Model, run, simulate
 from kfcourse.filters import kalman_filter, particle
 from kfcourse.filters.densities import likelihood
 from kfcourse.lab import find_variant
@@ -18,8 +18,7 @@ from kfcourse.lab.short_names import exact
 from kfcourse.montecarlo.experiment import states
 from kfcourse.records import likelihood as evidence
 
-PARTICLES, REPLICAS = 400, 60  # of a trajectory; how often each is filtered with its own particles
-VARIANTS = {name: variant.model for name, variant in load_variants().items()}
+PARTICLES, REPLICAS = 300, 40  # of a trajectory; how often each is filtered with its own particles
 LINEAR = Model.define(
     ["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 - 0.1*x1 + 0.3*v2"],
     ["x1 + 0.5*w1", "x2 + 0.3*x1 + 0.6*w2 + 0.2*w1"],
@@ -66,7 +65,7 @@ def histories(model, y):
 def replicas(model, y, steps):
     """Means, variances, modes' probabilities, stated errors and both halves of some steps: (steps,
     runs, REPLICAS, ...)."""
-    visited = list(states(particle(model, PARTICLES, seed=5), np.repeat(y, REPLICAS, axis=1)))[1:]
+    visited = states(particle(model, PARTICLES, seed=5), np.repeat(y, REPLICAS, axis=1))[1:]
     rows = [
         (
             state.posterior.mean,
@@ -85,7 +84,7 @@ def agree(sample, expected, unit):
     """The mean over replicas (axis 2) is the expected within 5 standard errors and the bias of a
     ratio of sums over particles.
 
-    Five, as some hundred numbers are compared with standard errors known from 60.  The bias is a
+    Five, as some hundred numbers are compared with standard errors known from 40.  The bias is a
     few 1/PARTICLES; "few" is the particles over the effective ones, below 10 here.
     """
     error, standard = sample.mean(axis=2) - expected, sample.std(axis=2, ddof=1) / np.sqrt(REPLICAS)
@@ -104,17 +103,15 @@ def test_of_a_scalar_model_it_is_the_exact_filter(name):
     else:  # where the prior has particles: far out, few would be effective
         x, y = simulate(model, 30, 6, seed=1)
         y = y[:, np.argsort(np.abs(x[0, :, 0]))[:3]]
-    visited = list(states(exact(model), y))[1:]
+    visited = states(exact(model), y)[1:]
     right = [visited[k] for k in steps]
-    z, variance = (
-        np.array([part(s) for s in right])
-        for part in (lambda s: s.posterior.mean, lambda s: s.posterior.cov[..., 0])
-    )
+    z = np.array([state.posterior.mean for state in right])
+    variance = np.array([state.posterior.cov[..., 0] for state in right])
     mean, own, probability, *_ = replicas(model, y, steps)
     agree(mean, z, np.sqrt(variance))
     agree(own, variance, variance)
     if name.startswith("J"):
-        agree(probability, np.array([s.memory.probability for s in right]), 0.5)
+        agree(probability, np.array([state.memory.probability for state in right]), 0.5)
 
 
 def test_of_a_linear_vector_model_it_is_the_kalman_filter():
@@ -142,7 +139,7 @@ def test_on_linear_modes_it_is_the_sum_over_all_histories(model):
     agree(probability, pi, 0.5)
     scale = variance.sum(axis=-1)[..., None]
     wrong = ((mean - z[:, :, None]) ** 2).sum(axis=-1) / scale
-    # 9 * 60 squares of one or two normal numbers on either side: 7 % of each, of which 4 are
+    # 9 * 40 squares of one or two normal numbers on either side: 8 % of each, of which 4 are
     # allowed
     assert (stated**2 / scale).mean() / wrong.mean() == pytest.approx(1, abs=0.35)
     products = (halves - z[:, :, None, None]).prod(axis=3).sum(axis=-1) / scale
@@ -153,13 +150,10 @@ def test_on_linear_modes_it_is_the_sum_over_all_histories(model):
 
 def test_the_evidence_is_that_of_all_histories():
     y = simulate(THROWN, 3, 5, seed=8).y
-    found = evidence(particle(THROWN, 4000), y).sum(axis=0)
+    total = evidence(particle(THROWN, 4000), y).sum(axis=0)
     for i in range(3):
         # some 600 of 4000 weights count: 4 %, at some steps of the first anew
-        assert abs(found[i] - histories(THROWN, y[:, i])[3]) < 4 * 0.05
-
-
-# --- behaviour
+        assert abs(total[i] - histories(THROWN, y[:, i])[3]) < 4 * 0.05
 
 
 def test_a_nonlinear_noise_of_the_object_is_admitted():

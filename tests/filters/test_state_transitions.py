@@ -3,22 +3,22 @@ refused."""
 
 import numpy as np
 import pytest
+from test_jumps import SENSOR, failing, of
 
-from kfcourse import JumpModel, ModelError, gaussian, linearised, run, simulate
+from kfcourse import JumpModel, ModelError, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.experiment import states
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
 pytestmark = pytest.mark.quick
 
-SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10.0}}}
 FAR = [["0.98*exp(-x**2/8)", "1 - 0.98*exp(-x**2/8)"], ["0.3*exp(-x**2/8)", "1 - 0.3*exp(-x**2/8)"]]
 
 
-def overloaded(transition=FAR, modes=SENSOR, state="0.9*x + 0.7*v", **options):
-    given = {"first": [0.9, 0.1], "prior": {"mean": 0.5, "variance": 3}} | options
-    return JumpModel.define(state, "x + C*w", modes=modes, transition=transition, **given)
+def overloaded(transition=FAR, **options):
+    return failing(transition=transition, first=[0.9, 0.1], mean=0.5, variance=3, **options)
 
 
 def probabilities(x):
@@ -27,20 +27,14 @@ def probabilities(x):
     return np.stack([1 - 0.98 * near, 1 - 0.3 * near], axis=-1)
 
 
-def of(build, model, kind=gaussian):
-    return build([kind(mode) for mode in model.modes], model, model.first)
-
-
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
 def test_a_constant_formula_is_the_constant_matrix_bit_for_bit(build):
     numbers = overloaded([[0.9, 0.1], [0.3, 0.7]])
     formulas = overloaded([["0.9 + 0*x", "0.1 + x - x"], ["0.3*x/x", "0.35*2"]])
     assert not formulas.by_state
-    drawn = [simulate(one, 20, 10, seed=1) for one in (numbers, formulas)]
-    for left, right in zip(*drawn, strict=True):
-        np.testing.assert_array_equal(left, right)
-    found = [run(of(build, one), drawn[0].y) for one in (numbers, formulas)]
-    for left, right in zip(*found, strict=True):
+    drawn = [simulate(model, 20, 10, seed=1) for model in (numbers, formulas)]
+    laws = [run(of(build, model), drawn[0].y) for model in (numbers, formulas)]
+    for left, right in (*zip(*drawn, strict=True), *zip(*laws, strict=True)):
         np.testing.assert_array_equal(left, right)
 
 
@@ -118,14 +112,12 @@ def test_components_that_the_chain_does_not_contain_follow_by_regression():
 def test_the_exact_filter_is_a_plain_grid_of_both():
     model, x = overloaded(), np.linspace(-14, 14, 3001)
     y = simulate(model, 3, 8, seed=5).y
-    one = pointmass(model)
-    state, step = one.init(3), x[1] - x[0]
+    visited, step = states(pointmass(model), y), x[1] - x[0]
     prior = np.exp(-((x - 0.5) ** 2) / 6)
     grids = [np.stack([0.9 * prior, 0.1 * prior]) for _ in range(3)]
     kernel = np.exp(-0.5 * ((x[:, None] - 0.9 * x) / 0.7) ** 2) * step
     to_faulty = probabilities(x).T
-    for k in range(8):
-        state = one.step(state, y[k])
+    for k, state in enumerate(visited[1:]):
         for trajectory, value in enumerate(y[k, :, 0]):
             density = grids[trajectory]
             for j, C in enumerate((1.0, 10.0)):
@@ -167,8 +159,8 @@ def test_the_exact_filter_follows_probabilities_that_jump():
     jump = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
     steep = overloaded([["1/(1 + exp(1000*(x - 1)))", "1 - 1/(1 + exp(1000*(x - 1)))"], [0.3, 0.7]])
     y = simulate(jump, 40, 8, seed=1).y
-    found, expected = run(pointmass(jump), y), run(pointmass(steep), y)
-    assert (np.abs(found.mean - expected.mean) < 0.01 * np.sqrt(expected.cov[..., 0])).all()
+    law, expected = run(pointmass(jump), y), run(pointmass(steep), y)
+    assert (np.abs(law.mean - expected.mean) < 0.01 * np.sqrt(expected.cov[..., 0])).all()
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import sympy as sp
 from kfcourse.filters import EQUATIONS, aof, latex, pointmass
 from kfcourse.filters.designed import Design
 from kfcourse.lab import FILTERS, LAB, find_variant, lab_filters, load_variants
-from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures
+from kfcourse.lab.short_names import JUMP_FILTERS, Structures
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import compare, run
@@ -140,7 +140,7 @@ def filters(name):
 
 def modes(name):
     """The same of filters with modes that need no design."""
-    built_of = JumpStructures(VARIANTS[name])
+    built_of = Structures(VARIANTS[name])
     values = {}
     for short in ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-averaged"):
         try:
@@ -177,8 +177,8 @@ def exact(name):
 def comparison(name):
     """Error variances of the lab's filters, and their standard errors."""
     model = PLAIN[name]
-    found = compare(lab_filters(model), model, 20_000, 10, seed=1, progress=False)
-    variances = {short: found.error_variance(short) for short in LAB}
+    result = compare(lab_filters(model), model, 20_000, 10, seed=1, progress=False)
+    variances = {short: result.error_variance(short) for short in LAB}
     return {short: np.array([each.value, each.standard_error]) for short, each in variances.items()}
 
 

@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import Model, cli, compare, lab_filters, load_variants
+from kfcourse import Model, cli, load_variants
 from kfcourse.checks.posing import unposed
-from kfcourse.filters import Filter
-from kfcourse.filters.base import State, initial_state
 from kfcourse.lab import grammar, quality
 from kfcourse.lab.grammar import PIECES, generate, propose
 from kfcourse.lab.quality import (
@@ -21,42 +19,20 @@ from kfcourse.lab.quality import (
     Finding,
     Quality,
     bounded,
-    differences,
     examine,
     examine_all,
-    shares,
     table,
-    unmeasured,
 )
-from kfcourse.lab.short_names import LAB
-from kfcourse.lab.variants import STEPS, VariantError, read_variant
-from kfcourse.laws import Gaussian
+from kfcourse.lab.variants import STEPS, read_variant
 from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo import FEWEST
-from kfcourse.montecarlo.ensemble import simulate
 
 SHIPPED = load_variants()
-LINEAR = SHIPPED["1"].model
-DESIGNED = ("duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 
 def variant(state, meter, parameters=None, **options):
     return read_variant(
         "t", {"state": state, "meter": meter, "parameters": parameters or {}} | options, "the test"
-    )
-
-
-def compared(model, names, runs, seed, steps=STEPS):
-    """A comparison that holds the estimate without measurements too."""
-    x = simulate(model, 20_000, steps, seed + 1000).x
-    return compare(
-        [*lab_filters(model, names), unmeasured(model, x)],
-        model,
-        runs,
-        steps,
-        seed,
-        jobs=1,
-        progress=False,
     )
 
 
@@ -67,7 +43,8 @@ def compared(model, names, runs, seed, steps=STEPS):
 def test_a_shipped_variant_is_well_posed(name):
     """In variant 12 the filters differ by a thousandth only, in 53 by a few tails: that takes more
     trajectories to see."""
-    found = examine(SHIPPED[name], 40_000 if name in ("12", "53") else 10_000)
+    vector = SHIPPED[name].model.n > 1  # gets an eighth
+    found = examine(SHIPPED[name], 20_000 if vector or name in ("12", "53") else 4_000)
     assert found.well_posed, found.faults
     assert found.linear == (name == "1")
     assert found.findings["filters differ"].ok == (name != "1")
@@ -133,10 +110,6 @@ BAD = {
     "almost linear": (
         dict(state="0.9*x + 0.3*v", meter="x + 0.001*x**2 + 0.5*w"),
         {"filters differ": SAME},
-    ),
-    "no closed form": (
-        dict(state="0.9*x + 0.3*v", meter="log(1 + x**2) + x + 0.3*w"),
-        {"solvable": r"term log\(x\*\*2 \+ 1\)"},
     ),
     "not differentiable": (
         dict(state="0.9*x + 0.3*v", meter="abs(x) + x + 0.3*w"),
@@ -235,89 +208,25 @@ def riccati(steps):
     return sum(ratios) / steps
 
 
-def test_the_share_of_a_kalman_filter_is_that_of_the_riccati_equation():
-    found = shares(compared(LINEAR, ["aof-gaussian"], 20_000, 1), "aof-gaussian")
-    assert abs(found.value[0] - riccati(STEPS)) < 4 * found.standard_error[0]
-    assert found.standard_error[0] < 0.01 * found.value[0]  # so that the line above tells something
+def test_the_share_of_a_linear_variant_is_that_of_the_riccati_equation():
+    """The variances over which it is taken are those of a sample: with 10,000 trajectories good to
+    1.4 % at a step, and at some ten independent steps."""
+    share = examine(SHIPPED["1"], 10_000).findings["observable"].value
+    assert share == pytest.approx(riccati(STEPS), rel=4 * np.sqrt(2 / 10_000 / 10))
 
 
 def test_a_share_that_is_not_known_well_is_not_enough():
     """Behind this meter 0.84 is left: below UNSEEN = 0.9, but by less than four standard errors of
     256 trajectories."""
     one = variant("0.9*x + 0.3*v", "x + f*w", {"f": 3.5})
-    few, many = (examine(one, runs).findings["observable"] for runs in (256, 20_000))
+    few, many = (examine(one, runs).findings["observable"] for runs in (256, 8_000))
     assert few.value < 0.9
     assert not few.ok
     assert many.ok
 
 
-def test_the_estimate_without_measurements_is_the_mean():
-    model = Model.define("0.5*x + 1 + v", "x + w", prior={"mean": 3, "variance": 2})
-    x = simulate(model, 40_000, 4, 1).x
-    one = unmeasured(model, x)
-    state = one.init(3)
-    mean, variance = 3.0, 2.0
-    for _ in range(4):
-        state = one.step(state, np.full((3, 1), 1e6))
-        assert abs(state.posterior.mean - mean).max() < 4 * np.sqrt(variance / 40_000)
-        assert abs(state.posterior.cov / variance - 1) < 4 * np.sqrt(2 / 40_000)
-        mean, variance = 0.5 * mean + 1, 0.25 * variance + 1
-
-
-# --- the filters differ
-
-
-def test_the_filters_of_a_linear_variant_do_not_differ_even_if_their_design_is_noisy():
-    result = compared(LINEAR, LAB, 10_000, 4)
-    assert differences(result, DESIGNED) == Finding(
-        False, "no two filters differ by more than the statistical error of 10000 trajectories", 0.0
-    )
-
-
-def test_the_largest_difference_is_found_where_theory_has_it():
-    """Variant 2 at step 0, x ~ N(0, 1), y = x + h x^2 + f w: linearised and Gaussian gains by
-    hand."""
-    h, f = 0.3, 0.3
-
-    def error_variance(gain, mean):  # M(x - K(x + h x^2 + f w - mean))^2 with M x^2 = 1, M x^4 = 3
-        return (1 - gain) ** 2 + gain**2 * (3 * h**2 - 2 * h * mean + mean**2 + f**2)
-
-    linearised, exact = (
-        error_variance(1 / (1 + f**2), 0.0),
-        error_variance(1 / (1 + 2 * h**2 + f**2), h),
-    )
-    result = compared(SHIPPED["2"].model, ["aof-gaussian", "aof-linearised"], 20_000, 1)
-    found = differences(result, ())
-    assert found.ok
-    assert found.says.startswith("GAOF and LAOF differ by ")
-    assert found.says.endswith("at step 0")
-    error = result.difference("aof-gaussian", "aof-linearised").standard_error[0] / exact
-    # 5: the denominator varies too, less
-    assert abs(found.value - (linearised / exact - 1)) < 5 * error
-
-
-def test_false_alarms_are_as_rare_as_promised():
-    """Two equal meters, each filter reads one: of 60 ensembles 1 % may alarm, four with a
-    probability of 0.003."""
-    model = Model.define(["0.5*x1 + v1"], ["x1 + w1", "x1 + w2"], symbols={"x": ["x1"]})
-
-    def reading(place):
-        def step(state, y):
-            law = Gaussian(y[:, place : place + 1], np.eye(1))
-            return State(state.step + 1, law, law)
-
-        return Filter(f"meter {place}", model, initial_state(model), step)
-
-    filters = [reading(0), reading(1)]
-    alarms = sum(
-        differences(compare(filters, model, 512, 16, seed, jobs=1, progress=False), ()).ok
-        for seed in range(60)
-    )
-    assert alarms <= 3
-
-
 def test_linear_is_linear_in_state_and_noise():
-    assert is_linear(LINEAR)
+    assert is_linear(SHIPPED["1"].model)
     assert is_linear(Model.define(["x1 + 0.1*x2 + v1", "x2"], ["(x1 + 1)**2 - x1**2 + w1"]))
     for state, meter in (
         ("x*v", "x + w"),
@@ -341,26 +250,17 @@ GOOD = {
 
 def test_the_table_tells_everything():
     same = {"filters differ": Finding(False, "same", 0.0)}
-    good = Quality("a", GOOD)
-    bad = Quality("bad", GOOD | {"observable": Finding(False, "blind", 0.97)} | same)
-    linear = Quality("lin", GOOD | same, True, ("linear",))
-    lost = Quality(
-        "lost",
-        {"bounded": Finding(False, "explodes", 1e9), "solvable": GOOD["solvable"]},
-        remarks=("one", "two"),
-    )
-    lines = table([good, bad, linear, lost]).splitlines()
-    assert lines[0].split() == [
-        "variant",
-        "bounded",
-        "observable",
-        "filters",
-        "differ",
-        "solvable",
-        "remarks",
-    ]
-    assert [line.split() for line in lines[1:5]] == [
-        ["a", "yes", "yes", "12.3", "%", "yes", "5", "%", "yes"],
+    bad = GOOD | {"observable": Finding(False, "blind", 0.97)} | same
+    lost = {"bounded": Finding(False, "explodes", 1e9), "solvable": GOOD["solvable"]}
+    lines = table(
+        [
+            Quality("bad", bad),
+            Quality("lin", GOOD | same, True, ("linear",)),
+            Quality("lost", lost, remarks=("one", "two")),
+        ]
+    ).splitlines()
+    assert [line.split() for line in lines[:4]] == [
+        ["variant", "bounded", "observable", "filters", "differ", "solvable", "remarks"],
         ["bad", "yes", "NO", "97", "%", "NO", "yes"],
         ["lin", "yes", "yes", "12.3", "%", "equal", "yes", "linear"],
         ["lost", "NO", "-", "-", "yes", "one;", "two"],
@@ -370,7 +270,6 @@ def test_the_table_tells_everything():
         "variant bad is not well posed, filters differ: same",
         "variant lost is not well posed, bounded: explodes",
     ]
-    assert [one.well_posed for one in (good, bad, linear, lost)] == [True, False, True, False]
 
 
 # --- proposals
@@ -378,7 +277,7 @@ def test_the_table_tells_everything():
 
 def test_every_candidate_is_a_model_with_numbers_to_type():
     shapes = set()
-    for index in range(200):
+    for index in range(60):
         proposed = propose(5, index)
         model = read_variant("t", proposed, "the test").model
         assert all(float(f"{value:.2g}") == value for value in proposed["parameters"].values())
@@ -391,7 +290,7 @@ def test_every_candidate_is_a_model_with_numbers_to_type():
             }
         )
         shapes.add(str([proposed["state"], proposed["meter"]]))
-    assert len(shapes) > 80
+    assert len(shapes) > 40
     assert any("x2" in shape for shape in shapes)
     assert propose(5, 3) == propose(5, 3) != propose(6, 3)
 
@@ -401,34 +300,25 @@ def test_no_two_pieces_of_an_equation_share_a_parameter():
         for pieces in product(*(PIECES[kind] for kind in kinds)):
             names = [name for _, _, ranges, _ in pieces for name in ranges]
             assert len(set(names)) == len(names)
-    for _, _, ranges, weight in (piece for pieces in PIECES.values() for piece in pieces):
-        assert all(low < high for low, high in ranges.values()) and weight > 0
 
 
 @pytest.fixture(scope="module")
 def generated():
-    return generate(2, seed=6, runs=1000, jobs=1, ask=unposed)
+    return generate(1, seed=1, runs=512, jobs=1)
 
 
-def test_what_is_generated_is_read_back_and_well_posed_with_another_seed(generated, tmp_path):
+def test_what_is_generated_is_read_back(generated, tmp_path):
     path = tmp_path / "new.toml"
     path.write_text(generated.toml(), encoding="utf-8")
-    read = load_variants(path)
-    assert list(read) == ["g1", "g2"]
-    assert [one.model for one in read.values()] == [one.model for one in generated.variants]
-    for one, before in zip(read.values(), generated.variants, strict=True):
-        assert one.title == before.title != ""
-        assert one.model.prior.mean.tolist() == before.model.prior.mean.tolist()
-        assert one.model.prior.cov.tolist() == before.model.prior.cov.tolist()
-        found = examine(one, 1000, seed=77, ask=unposed)
-        assert found.well_posed, found.faults
-        assert not found.linear
-    assert sum(generated.rejected.values()) > 0
+    (read,), (before,) = load_variants(path).values(), generated.variants
+    assert (read.name, read.model, read.title) == ("g1", before.model, before.title)
+    assert read.model.prior.cov.tolist() == before.model.prior.cov.tolist()
+    assert not examine(read, 512, seed=77).linear and sum(generated.rejected.values()) > 0
 
 
 @pytest.mark.slow
 def test_the_same_seed_generates_the_same_text_whatever_the_processes(generated):
-    again = generate(2, seed=6, runs=1000, jobs=2, ask=unposed)
+    again = generate(1, seed=1, runs=512, jobs=2)
     assert again.toml() == generated.toml()
     assert again.rejected == generated.rejected
 
@@ -496,29 +386,16 @@ def call(tmp_path, monkeypatch):
     return invoke
 
 
-def test_check_says_well_posed_by_status_0(call):
-    result = call("--check", "--variant", "1", "--variant", "2", "--runs", 4000, "--jobs", 1)
+def test_check_says_by_its_status_whether_all_are_well_posed(call, tmp_path):
+    result = call("--check", "--variant", "1", "--runs", 512, "--jobs", 1)
     assert result.exit_code == 0, result.output
-    rows = [line.split()[0] for line in result.stdout.splitlines()[:3]]
-    assert rows == ["variant", "1", "2"]
-    assert "equal" in result.stdout
-    assert "not well posed" not in result.output
-
-
-def test_check_says_what_is_wrong_by_status_1(call, tmp_path):
+    assert "equal" in result.stdout and "not well posed" not in result.output
     (tmp_path / "mine.toml").write_text(
         '[variants.boom]\nstate = "1.2*x + v"\nmeter = "x**2 + x + w"\n', encoding="utf-8"
     )
     result = call("--check", "--variants", "mine.toml", "--runs", 256, "--jobs", 1)
     assert result.exit_code == 1
     assert "variant boom is not well posed, bounded: the second moment grows" in result.stdout
-    assert "Traceback" not in result.output
-
-
-def test_the_list_may_be_shortened(call):
-    result = call("--variant", "53", "--variant", "53")
-    assert result.exit_code == 0
-    assert result.stdout.count("x' = ") == 1
 
 
 @pytest.fixture
@@ -534,7 +411,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(grammar, "generate", made)
 
 
-def test_proposals_are_printed_and_rejections_are_not_among_them(call, quick):
+def test_proposals_are_printed_or_go_to_a_new_file(call, quick, tmp_path):
     result = call("--generate", 2, "--seed", 9)
     assert result.exit_code == 0
     assert list(tomllib.loads(result.stdout)["variants"]) == ["g1", "g2"]
@@ -542,19 +419,11 @@ def test_proposals_are_printed_and_rejections_are_not_among_them(call, quick):
         "# Made by: kfcourse variants --generate 2 --seed 9 --runs 40000\n"
     )
     assert result.stderr == "4 candidates rejected: 3 bounded, 1 linear\n"
-
-
-def test_proposals_go_to_a_new_file(call, quick, tmp_path):
-    assert call("--generate", 2, "--out", "new.toml").stdout == ""
+    result = call("--generate", 3, "--out", "new.toml")  # too few are written, and it is said
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "only 2 of 3 variants found" in result.stderr
     assert list(load_variants(tmp_path / "new.toml")) == ["g1", "g2"]
     assert [path.name for path in tmp_path.iterdir()] == ["new.toml"]
-
-
-def test_too_few_proposals_are_written_and_said(call, quick, tmp_path):
-    result = call("--generate", 3, "--out", "new.toml")
-    assert result.exit_code == 1
-    assert "only 2 of 3 variants found" in result.stderr
-    assert len(load_variants(tmp_path / "new.toml")) == 2
 
 
 @pytest.mark.parametrize(
@@ -570,29 +439,15 @@ def test_a_bad_out_is_refused_before_the_computation(call, tmp_path, monkeypatch
     assert (tmp_path / "old.toml").read_text(encoding="utf-8") == "precious"
 
 
-def test_an_interrupt_leaves_no_file(call, tmp_path, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(grammar, "generate", interrupted)
-    assert call("--generate", 1, "--out", "new.toml").exit_code == 130
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("--generate", 0),
         ("--generate", 201),
-        ("--generate", "many"),
-        ("--generate", 1, "--seed", -1),
         ("--generate", 1, "--check"),
         ("--generate", 1, "--variant", "53"),
         ("--generate", 1, "--variants", "mine.toml"),
         ("--check", "--out", "new.toml"),
         ("--out", "new.toml"),
-        ("--check", "--jobs", 0),
-        ("--check", "--seed", "x"),
     ],
 )
 def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
@@ -603,21 +458,15 @@ def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
     assert "Traceback" not in result.output
 
 
-def test_an_unknown_variant_or_file_is_named(call):
-    result = call("--check", "--variant", "999")
-    assert result.exit_code == 1
-    assert "no variant '999'; there are 53, 1, 2" in result.stderr
-    result = call("--check", "--variants", "nothing.toml")
-    assert result.exit_code == 1
-    assert "nothing.toml" in result.stderr
-
-
-def test_a_bad_variant_in_the_file_is_named_before_any_check(call, tmp_path):
-    (tmp_path / "mine.toml").write_text(
-        '[variants.a]\nstate = "x + v"\nmeter = "3 + w"\n', encoding="utf-8"
-    )
-    with pytest.raises(VariantError):
-        load_variants(tmp_path / "mine.toml")
-    result = call("--check", "--variants", "mine.toml")
-    assert result.exit_code == 1
-    assert "variant a in mine.toml" in result.stderr
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--variant", "999"], "no variant '999'; there are 53, 1, 2"),
+        (["--variants", "nothing.toml"], "nothing.toml"),
+        (["--variants", "mine.toml"], "variant a in mine.toml"),
+    ],
+)
+def test_what_cannot_be_checked_is_named(call, tmp_path, arguments, message):
+    (tmp_path / "mine.toml").write_text('[variants.a]\nstate = "x + v"\nmeter = "3 + w"\n')
+    result = call("--check", *arguments)
+    assert result.exit_code == 1 and message in result.stderr

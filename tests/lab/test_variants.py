@@ -29,53 +29,25 @@ GOOD = 'state = "0.9*x + v"\nmeter = "x + w"\n'
 # --- the shipped variants
 
 
-def test_there_are_variant_53_and_eleven_more():
+def test_the_shipped_variants():
+    """Names, titles and structural functions of their own; scalar ones have the exact filter."""
     assert len(SHIPPED) >= 12
     assert str(SHIPPED["53"].model.state_equation[0]) == "c*x + e*v*x"
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_a_variant_has_its_name_and_a_title_of_its_own(name):
-    assert SHIPPED[name].name == name
-    assert SHIPPED[name].title
-    assert [variant.title for variant in SHIPPED.values()].count(SHIPPED[name].title) == 1
-
-
-def test_the_variants_exercise_different_structural_functions():
+    assert all(variant.name == name for name, variant in SHIPPED.items())
+    titles = {variant.title for variant in SHIPPED.values()}
     printed = {gaussian(variant.model).latex() for variant in SHIPPED.values()}
-    assert len(printed) == len(SHIPPED)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_every_filter_of_the_lab_is_built_for_a_variant(name):
-    assert [one.name for one in lab_filters(SHIPPED[name].model)] == list(LAB)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_the_exact_filter_is_offered_for_the_scalar_variants(name):
-    assert has_exact(SHIPPED[name].model) == (SHIPPED[name].model.n == 1)
+    assert "" not in titles and len(titles) == len(printed) == len(SHIPPED)
+    for variant in SHIPPED.values():
+        assert [one.name for one in lab_filters(variant.model)] == list(LAB)
+        assert has_exact(variant.model) == (variant.model.n == 1)
 
 
 # --- the filters by their short names
 
 
-def test_the_issue_s_short_names_are_there():
-    assert {*LAB, "aof-exact"} == {
-        "aof-gaussian",
-        "aof-linearised",
-        "duof",
-        "fos-gaussian",
-        "fos-linearised",
-        "mfos-gaussian",
-        "mfos-linearised",
-        "aof-exact",
-    }
-    assert set(LAB) < set(FILTERS)
-
-
 def test_every_filter_builds_and_carries_its_short_name():
-    built = lab_filters(SHIPPED["53"].model, list(FILTERS))
-    assert [one.name for one in built] == list(FILTERS)
+    built = lab_filters(SHIPPED["53"].model, [*FILTERS, "duof"])
+    assert [one.name for one in built] == list(FILTERS)  # and what is asked for twice, once
     assert all(isinstance(one, Filter | Design) for one in built)
 
 
@@ -83,10 +55,6 @@ def test_titles_are_distinct():
     assert len({title(name) for name in FILTERS}) == len(FILTERS)
     assert len({entry.russian for entry in FILTERS.values()}) == len(FILTERS)
     assert title("mine") == "mine"
-
-
-def test_a_name_asked_for_twice_is_built_once():
-    assert [one.name for one in lab_filters(SHIPPED["53"].model, ["duof", "duof"])] == ["duof"]
 
 
 def test_an_unknown_filter_is_named_with_the_known_ones():
@@ -114,20 +82,6 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
 # --- files of variants
 
 
-def test_the_issue_s_example_is_read(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        '[variants.53]\nstate = "c*x + e*x*v"\nmeter = "g*x + f*x**2*w"\n'
-        "parameters = { c = 0.9, e = 0.05, g = 1.0, f = 0.02 }\nprior = { mean = 0.0, variance = "
-        "1.0 }\n",
-        encoding="utf-8",
-    )
-    mine = load_variants(str(path))
-    assert list(mine) == ["53"]
-    assert mine["53"].model == SHIPPED["53"].model
-    assert mine["53"].title == ""
-
-
 def test_all_keys_of_a_vector_variant_are_read(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(
@@ -148,29 +102,14 @@ def test_all_keys_of_a_vector_variant_are_read(tmp_path):
     assert (model.meter_noise.mean.tolist(), model.meter_noise.cov.tolist()) == ([0.5], [[4.0]])
 
 
-def test_an_unknown_variant_is_named_with_the_known_ones():
-    with pytest.raises(VariantError, match=r"no variant 'none'; there are 53, 1, "):
-        find_variant("none")
-
-
 BAD_VARIANTS = {
     "no state": ('meter = "x + w"', "no state"),
-    "neither": ('title = "nothing"', "no meter and no state"),
     "unknown key": (GOOD + "speed = 1", "unknown key speed"),
     "bad formula": ('state = "x +* v"\nmeter = "x + w"', "cannot be read"),
-    "empty formula": ('state = ""\nmeter = "x + w"', "empty"),
     "unknown symbol": ('state = "c*x + v"\nmeter = "x + w"', "'c'"),
     "meter without state": ('state = "x + v"\nmeter = "3 + w"', "does not depend on the state"),
-    "attribute": ('state = "x.__class__"\nmeter = "x + w"', "not allowed"),
-    "a power tower": ('state = "x*9**9**9**9 + v"\nmeter = "x + w"', "exponent"),
-    "a long formula": (
-        'state = "' + "(" * 5000 + "x" + ")" * 5000 + '"\nmeter = "x + w"',
-        "characters",
-    ),
     "parameter nan": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = nan }', "c = nan"),
-    "parameter text": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = "0.9" }', "'0.9'"),
     "parameter named as the state": (GOOD + "parameters = { x = 1 }", "named twice"),
-    "parameters in a list": (GOOD + "parameters = [1]", "parameters"),
     "negative variance": (GOOD + "prior = { variance = -1.0 }", "negative variance"),
     "a product beyond the floats": (
         'state = "a*a*a*a*a*x + v"\nmeter = "x + w"\nparameters = { a = 1e99 }',
@@ -182,13 +121,6 @@ BAD_VARIANTS = {
         GOOD + "prior = { variance = 0 }\nstate_noise = { variance = 0 }",
         "known exactly",
     ),
-    "mean of the wrong shape": (GOOD + "prior = { mean = [1, 2] }", "`prior`"),
-    "covariance not symmetric": (
-        'state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nprior = { variance = [[1.0, 0.5], [0.0, '
-        "1.0]] }",
-        "symmetric",
-    ),
-    "law of other keys": (GOOD + "prior = { sigma = 1 }", "sigma"),
     "a number in quotes": (GOOD + 'prior = { mean = "1e5" }', "got mean = '1e5'"),
     "inputs in quotes": (
         GOOD.replace("x + w", "x + u + w") + 'inputs = { u = ["1", "2"] }',
@@ -199,7 +131,6 @@ BAD_VARIANTS = {
         GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}",
         "numbers of thousands of digits",
     ),
-    "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
     "symbols not named": (GOOD + "symbols = { x = 5 }", "x must be a name or a list of names"),
 }
 
@@ -226,11 +157,8 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
     [
         "__import__('os').system('touch {marker}')",
         "open('{marker}', 'w')",
-        "exec('open(\\\\'{marker}\\\\', \\\\'w\\\\')')",
         "(lambda: open('{marker}', 'w'))()",
-        "[open('{marker}', 'w') for _ in (1,)][0]",
         "x + ().__class__.__base__.__subclasses__()[0]",
-        "sympify('open')",
         "f'{{open(1)}}'",
     ],
 )
@@ -250,9 +178,7 @@ def test_a_formula_cannot_execute_code(tmp_path, formula):
     [
         ("", "no variants"),
         ("variants = 3", "no variants"),
-        ("[variants]", "no variants"),
         ("[variant.53]\n" + GOOD, "no variants"),
-        ("[variants.53\n" + GOOD, "not valid TOML"),
         ("[variants.a]\nstate = c*x + v", "column 9); formulas and other texts stand in quotes"),
         (
             "[variants.a]\n" + GOOD + "parameters = { c = .9 }",
@@ -266,7 +192,6 @@ def test_a_formula_cannot_execute_code(tmp_path, formula):
             "is not valid TOML",
         ),
         ("[variants]\nbad = 5", "variant bad in"),
-        ("[[variants]]\n" + GOOD, "no variants"),
         (b"\xff\xfe", "cannot be read"),
     ],
 )
@@ -281,7 +206,8 @@ def test_a_bad_file_is_refused_by_name(tmp_path, content, problem):
 
 def test_only_the_variants_asked_for_are_built(tmp_path, monkeypatch):
     path, built = tmp_path / "many.toml", []
-    path.write_text("".join(f"[variants.{i}]\n{GOOD}" for i in range(5000)), encoding="utf-8")
+    text = "".join(f"[variants.{i}]\n{GOOD}" for i in range(5000))
+    path.write_text(text, encoding="utf-8-sig")  # an editor's byte order mark is no part of it
     whole = of_variants.read_variant
     monkeypatch.setattr(
         of_variants, "read_variant", lambda name, *rest: built.append(name) or whole(name, *rest)
@@ -297,17 +223,10 @@ def test_only_the_variants_asked_for_are_built(tmp_path, monkeypatch):
         find_variant("x", path)
 
 
-def test_an_editor_s_byte_order_mark_is_no_part_of_the_file(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text("[variants.a]\n" + GOOD, encoding="utf-8-sig")
-    assert find_variant("a", path).model == Model.define("0.9*x + v", "x + w")
-
-
 def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
-    with pytest.raises(VariantError, match=r"no file of variants at .*nothing\.toml"):
-        load_variants(tmp_path / "nothing.toml")
-    with pytest.raises(VariantError, match=f"no file of variants at {tmp_path}"):
-        load_variants(tmp_path)
+    for path in (tmp_path / "nothing.toml", tmp_path):
+        with pytest.raises(VariantError, match=f"no file of variants at {path}"):
+            load_variants(path)
 
 
 def test_models_that_all_jump_are_no_empty_list(tmp_path):

@@ -40,7 +40,6 @@ def symmetrical(matrix):
 SYSTEMS = {
     "scalar": (1, 1, 1, 1),
     "two states": (2, 1, 0, 2),
-    "two meters": (2, 2, 1, 3),
     "large": (4, 3, 2, 4),
     "more meters": (2, 3, 2, 5),
 }
@@ -96,8 +95,6 @@ def test_steady_state_against_python_control(case):
     np.testing.assert_allclose(found.predicted, P, rtol=1e-9, atol=1e-9)
     # its gain is that of the prediction
     np.testing.assert_allclose(one.A @ found.gain, L, rtol=1e-9, atol=1e-9)
-    X, _, _ = control.dare(one.A.T, one.H.T, one.Q, one.R)
-    np.testing.assert_allclose(found.predicted, X, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("growth", [1.0, 1.1])
@@ -176,9 +173,7 @@ GOOD = {"A": np.eye(2), "H": np.ones((1, 2)), "Q": np.eye(2), "R": np.eye(1), "B
             r"A must be a finite matrix, with 2 states and 1 measurements of the shape \(2, 2\)",
         ),
         ("B", np.ones((3, 1)), r"B must be a finite matrix.* of the shape \(2, 1\)"),
-        ("A", np.array([[1, np.nan], [0, 1]]), "A must be a finite matrix"),
         ("Q", np.array([[1, 0.5], [0, 1]]), "Q is a covariance: symmetric and not negative"),
-        ("Q", np.array([[1.0, 2], [2, 1]]), "Q is a covariance: symmetric and not negative"),
     ],
 )
 def test_a_system_that_is_none(name, value, message):
@@ -198,10 +193,8 @@ def ran(**change):
     ("call", "message"),
     [
         (lambda: ran(y=np.zeros((4, 1))), r"shape \(steps, runs, 1\), .* got \(4, 1\)"),
-        (lambda: ran(y=np.zeros((0, 3, 1))), "NaN where one is missing"),
         (lambda: ran(y=np.full((4, 3, 1), np.inf)), "must be finite.*12 of them infinite"),
         (lambda: ran(u=np.zeros((3, 3, 1))), r"must be finite and have the shape \(4, 3, 1\)"),
-        (lambda: ran(u=np.full((4, 3, 1), np.nan)), "inputs must be finite"),
         (lambda: ran(prior=Gaussian(np.zeros(3), np.eye(2))), "mean must have the shape"),
         (lambda: ran(prior=Gaussian(np.zeros(2), -np.eye(2))), "variances must not be negative"),
         (
@@ -210,14 +203,9 @@ def ran(**change):
         ),
         (lambda: ran(system=BARE, u=np.zeros((4, 3, 1))), "no matrix B"),
         (lambda: simulate(BARE, GOOD_PRIOR, 4, 3, 1, np.zeros((4, 3, 1))), "no matrix B"),
-        (lambda: simulate(SOUND, GOOD_PRIOR, 0, 3, 1), "steps must be a positive whole number"),
         (
             lambda: covariances(SOUND, np.eye(3), 4),
             r"expected a covariance \(2, 2\) and gains .* got \(3, 3\)",
-        ),
-        (
-            lambda: covariances(SOUND, np.eye(2), 4, np.ones(2)),
-            r"gains \(2, 1\) or \(4, 2, 1\), got \(2, 2\) and \(2,\)",
         ),
     ],
 )

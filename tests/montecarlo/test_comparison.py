@@ -141,27 +141,9 @@ def test_differences_and_ratios_are_paired(direct):
     )
 
 
-def test_a_filter_does_not_differ_from_itself(direct):
-    result, _ = direct
-    own = result.difference("duof", "duof")
-    assert not own.value.any()
-    assert not own.standard_error.any()
-    ratio = result.relative("duof", "duof")
-    assert (ratio.value == 1).all()
-    assert (ratio.standard_error == 0).all()
-
-
 def test_an_unknown_name_is_answered_with_the_known_ones(direct):
-    result, _ = direct
-    for ask in (
-        result.error_variance,
-        result.error_mean,
-        result.normalised_error,
-        result.relative,
-        result.score,
-    ):
-        with pytest.raises(KeyError, match="aof-gaussian, duof, wrong"):
-            ask("ekf")
+    with pytest.raises(KeyError, match="aof-gaussian, duof, wrong"):
+        direct[0].error_variance("ekf")
 
 
 def test_intervals_are_student_s(direct):
@@ -170,22 +152,8 @@ def test_intervals_are_student_s(direct):
     half = stats.t.ppf(0.95, BATCHES - 1) * estimate.standard_error
     np.testing.assert_allclose(high - estimate.value, half, rtol=1e-9)
     np.testing.assert_allclose(estimate.value - low, half, rtol=1e-9)
-    np.testing.assert_allclose(estimate.half_width(0.9), half, rtol=1e-9)
-    for confidence in (0, 1, 95):
-        with pytest.raises(ValueError, match="confidence"):
-            estimate.interval(confidence)
-
-
-def test_of_means_the_jackknife_is_the_usual_standard_error():
-    """Of batches of one trajectory each: s / sqrt(B), with B - 1 degrees of freedom."""
-    values = np.random.default_rng(1).normal(size=(3, 10))
-    sums = Sums.empty(1, 3, 1, 10)._replace(weight=np.ones(10), own=values[None])
-    estimate = Estimate.jackknife(sums.means("own")[0])
-    np.testing.assert_allclose(estimate.value, values.mean(axis=1), rtol=1e-13)
-    np.testing.assert_allclose(
-        estimate.standard_error, values.std(axis=1, ddof=1) / np.sqrt(10), rtol=1e-13
-    )
-    assert estimate.freedom == 9
+    with pytest.raises(ValueError, match="confidence"):
+        estimate.interval(95)
 
 
 @pytest.mark.slow
@@ -205,18 +173,10 @@ def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
 
 
-def test_one_trajectory_has_no_standard_error(linear):
-    estimate = compare(
-        [kalman_filter(linear)], linear, 1, 2, seed=1, progress=False
-    ).error_variance("kalman")
-    assert np.isfinite(estimate.value).all()
-    assert np.isnan(estimate.standard_error).all()
-
-
 # ---------------------------------------------------------------- initial states
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 300])
+@pytest.mark.parametrize("size", [1, 7])
 def test_every_half_of_the_initial_states_has_one_in_each_stratum(size):
     standard = stratified(np.random.default_rng(1), size, 2, 3.0)
     for half, scale in ((standard[::2], 1.0), (standard[1::2], 3.0)):
@@ -305,7 +265,7 @@ def test_all_follows_from_the_bound_and_the_distances_from_it(bounded):
     looked at."""
     assert bounded.bound().value.item() == bounded.error_variance("aof-exact").value.item() == 4
     assert bounded.error_variance("other").value.item() == 5.5
-    assert bounded.excess("other").value.item() == 1.5
+    assert bounded.difference("other", "aof-exact").value.item() == 1.5
     assert bounded.difference("other", "aof-gaussian").value.item() == 1
     assert bounded.gap("other").value.item() == bounded.mean_gap("other").value == 1.5 / 4
     assert bounded.gap_difference("other", "aof-gaussian").value.item() == pytest.approx(
@@ -313,7 +273,9 @@ def test_all_follows_from_the_bound_and_the_distances_from_it(bounded):
     )
     distances = np.array([1.0, 2, 1, 2])
     np.testing.assert_allclose(
-        bounded.excess("other").standard_error, distances.std(ddof=1) / 2, rtol=1e-13
+        bounded.difference("other", "aof-exact").standard_error,
+        distances.std(ddof=1) / 2,
+        rtol=1e-13,
     )
     assert (
         [name for name, _ in bounded.ranking()] == ["aof-gaussian", "other"] == [*bounded.entrants]
@@ -323,9 +285,8 @@ def test_all_follows_from_the_bound_and_the_distances_from_it(bounded):
 
 def test_without_the_exact_filter_there_is_no_bound(variant53):
     result = by_hand(variant53, {"other": [2.0, 2, 2], "aof-gaussian": [1.0, 1, 1]})
-    for ask in (result.bound, lambda: result.excess("other")):
-        with pytest.raises(KeyError, match="the bound needs aof-exact"):
-            ask()
+    with pytest.raises(KeyError, match="the bound needs aof-exact"):
+        result.bound()
     assert result.gap("other").value.item() == 1 and result.reference == "aof-gaussian"
 
 
@@ -358,7 +319,7 @@ def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
     result = compare(filters, variant53, 300, 3, seed=2, progress=False)
     direct = [result.component_variance(name).value[:, 0] for name in result.names]
     above = Estimate.jackknife(result.sums.means("square")[0, :, 0] - result.sums.means("own")[2])
-    gap = result.excess("aof-gaussian")
+    gap = result.difference("aof-gaussian", "aof-exact")
     assert (abs(above.value - gap.value) < SIGMA * above.standard_error).all()
     assert (gap.standard_error < above.standard_error / 3).all()  # what the distances are for
     assert (gap.value > 0).all() and not result.doubtful.any() and np.isfinite(direct).all()
@@ -369,7 +330,7 @@ def test_the_particles_own_error_is_not_in_the_bound(linear):
     of both halves holds little."""
     exact = replace(particle(linear, 100), name="aof-exact")
     result = compare([kalman_filter(linear), exact], linear, 12_800, 1, seed=1, progress=False)
-    excess = result.excess("kalman")
+    excess = result.difference("kalman", "aof-exact")
     doubt = result.sums.means("doubt")[:, 0]
     # The clouds of each batch draw the same numbers: 200 independent products, of errors whose mean
     # square is twice the doubt.
@@ -402,17 +363,6 @@ def test_holm_s_test_of_four():
         [True, False],
     ]
     assert rejected(np.array([0.0125, 0.016, 0.024, 0.05]), 0.05).all()
-
-
-def test_the_ranking_does_not_keep_the_order_given(variant53):
-    squares = {
-        name: np.array([d, d + 1]) for name, d in (("worst", 9.0), ("best", 1.0), ("middle", 4.0))
-    }
-    assert [name for name, _ in by_hand(variant53, squares).ranking()] == [
-        "best",
-        "middle",
-        "worst",
-    ]
 
 
 def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
@@ -507,7 +457,7 @@ def test_the_table_of_the_page_is_reproduced(repeated, k):
         assert (abs(sample.mean(axis=0) - value) < quantile * error + rounding).all()
 
 
-def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):
+def test_a_printed_comparison_says_what_to_ask(variant53):
     found = compare(
         [aof(gaussian(variant53)), pointmass(variant53)], variant53, 100, 2, 7,
         smoothers=[aof(gaussian(variant53))], progress=False,
@@ -516,40 +466,29 @@ def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):
     assert heading == "Comparison of aof-gaussian, aof-exact: 2 steps, 100 trajectories, seed 7"
     for name in re.findall(r"(\w+)\(", asked):
         assert callable(getattr(found, name))
-    assert asked.endswith(".smoothing") and not repr(found.smoothing).endswith(".smoothing")
     without = replace(found, left_out={"aof-exact": "too slow"})
     assert str(without).splitlines()[1] == "left out: aof-exact, too slow"
-    assert (
-        str(replace(without, runs=10_000, seed=10_000))
-        .splitlines()[0]
-        .endswith("10,000 trajectories, seed 10000")
-    )
+
+
+BENT = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
+BOTH = [aof(gaussian(BENT)), aof(linearised(BENT))]
 
 
 def test_without_a_standard_error_nothing_is_significant():
-    nan = np.full(3, np.nan)
-    assert np.isnan(Estimate(np.array([np.nan, 1.0, 0.0]), nan, 5).p_value()).all()
-    np.testing.assert_array_equal(
-        Estimate(np.array([1.0, 0.0]), np.zeros(2), 5).p_value(), [0.0, 1.0]
-    )
-    model = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
-    alone = compare(
-        [aof(gaussian(model)), aof(linearised(model))], model, 1, 3, seed=1, progress=False
-    )
+    """Of one trajectory, or of a zero that is certain."""
+    certain = Estimate(np.array([1.0, 0.0]), np.zeros(2), 5)
+    np.testing.assert_array_equal(certain.p_value(), [0.0, 1.0])
+    alone = compare(BOTH, BENT, 1, 3, seed=1, progress=False)
+    assert np.isnan(alone.error_variance("aof-gaussian").standard_error).all()
+    assert np.isnan(alone.difference(*alone.names).p_value()).all()
     assert not any(verdict.worst for verdict in alone.verdicts())
 
 
 def test_means_over_no_steps():
-    model = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
-    result = compare(
-        [aof(gaussian(model)), aof(linearised(model))], model, 256, 4, seed=1, progress=False
-    )
-    for ask in (result.ranking, lambda steps: result.score("aof-linearised", steps)):
-        with pytest.raises(ValueError, match="none of the 4 steps"):
-            ask(slice(4, None))
+    result = compare(BOTH, BENT, 256, 4, seed=1, progress=False)
+    with pytest.raises(ValueError, match="none of the 4 steps"):
+        result.ranking(slice(4, None))
     object.__setattr__(result, "doubtful", np.array([True, True, False, False]))
-    assert np.isnan(result.mean_gap("aof-linearised", slice(2)).value)
-    assert np.isnan(result.mean_gap("aof-linearised", slice(2)).standard_error)
-    assert (
-        result.mean_gap("aof-linearised", slice(3)).value == result.gap("aof-linearised").value[2]
-    )
+    none, some = (result.mean_gap("aof-linearised", slice(k)) for k in (2, 3))
+    assert np.isnan(none.value) and np.isnan(none.standard_error)
+    assert some.value == result.gap("aof-linearised").value[2]

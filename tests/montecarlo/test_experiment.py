@@ -69,9 +69,6 @@ def test_ensembles_side_by_side_are_those_alone(variant53):
                 np.testing.assert_array_equal(side[here], alone)
 
 
-# ---------------------------------------------------------------- run
-
-
 # ---------------------------------------------------------------- compare
 
 
@@ -82,15 +79,13 @@ def numbers(comparison):
     ]
 
 
-@pytest.mark.parametrize("runs", [37, 2345])
-def test_the_number_of_jobs_changes_nothing(variant53, runs):
+def test_the_number_of_jobs_changes_nothing(variant53):
     results = [
-        compare(lab_of(variant53), variant53, runs, 6, seed=7, jobs=jobs, progress=False)
-        for jobs in (1, 2, 3)
+        compare(lab_of(variant53), variant53, 2345, 6, seed=7, jobs=jobs, progress=False)
+        for jobs in (1, 3)
     ]
-    for other in results[1:]:
-        for first, second in zip(numbers(results[0]), numbers(other), strict=True):
-            np.testing.assert_array_equal(first, second)
+    for first, second in zip(*map(numbers, results), strict=True):
+        np.testing.assert_array_equal(first, second)
 
 
 def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
@@ -103,7 +98,7 @@ def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
         )
 
 
-@pytest.mark.parametrize(("runs", "steps"), [(1, 1), (2, 1), (1, 5), (3, 4), (127, 3), (129, 2)])
+@pytest.mark.parametrize(("runs", "steps"), [(1, 1), (3, 4), (129, 2)])
 @pytest.mark.filterwarnings("error")
 def test_small_experiments_run(vector, runs, steps):
     result = compare(lab_of(vector), vector, runs, steps, seed=3, design_runs=200, progress=False)
@@ -145,54 +140,35 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
     ("arguments", "message"),
     [
         ({"runs": 0}, "runs"),
-        ({"runs": -5}, "runs"),
         ({"runs": 10.5}, "runs"),
-        ({"runs": "10"}, "runs"),
-        ({"runs": True}, "runs"),
         ({"steps": 0}, "steps"),
-        ({"steps": 2.0}, "steps"),
         ({"jobs": 0}, "jobs"),
         ({"design_runs": 0}, "runs"),
         ({"seed": -1}, "negative|seed"),
-        ({"seed": "one"}, "seed"),
         ({"seed": 1.5}, "seed"),
-        ({"seed": None}, "seed"),
         ({"filters": []}, "at least one"),
         ({"filters": "twice"}, "name of its own"),
         ({"filters": "other model"}, "model"),
     ],
 )
 def test_bad_arguments_are_value_errors_that_name_them(variant53, arguments, message):
-    one, other = (
-        aof(gaussian(variant53)),
-        Model.define(["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"]),
-    )
-    filters = {"twice": [one, one], "other model": [one, duof(other)]}
-    call = {
-        "filters": [one, duof(variant53)],
-        "model": variant53,
-        "runs": 10,
-        "steps": 2,
-        "seed": 1,
-    } | arguments
-    call["filters"] = (
-        filters.get(call["filters"], call["filters"])
-        if isinstance(call["filters"], str)
-        else call["filters"]
-    )
+    good = aof(gaussian(variant53))
+    vector = Model.define(["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"])
+    call = {"filters": [good], "model": variant53, "runs": 10, "steps": 2, "seed": 1} | arguments
+    if call["filters"] == "twice":
+        call["filters"] = [good, good]
+    if call["filters"] == "other model":
+        call["filters"] = [good, duof(vector)]
     with pytest.raises(ValueError, match=message):
         compare(progress=False, **call)
 
 
-@pytest.mark.parametrize("filters", ["ready", "designed"])
+@pytest.mark.parametrize("build", [lambda model: aof(gaussian(model)), duof])
 @pytest.mark.filterwarnings("error")
-def test_a_diverging_model_says_so(filters):
+def test_a_diverging_model_says_so(build):
     model = Model.define("x**3*2 + v", "x + w")
-    chosen = {"ready": [aof(linearised(model)), aof(gaussian(model))], "designed": [duof(model)]}[
-        filters
-    ]
     with pytest.raises(NotFinite, match=r"(become infinite|diverges)"):
-        compare(chosen, model, 200, 12, seed=1, progress=False)
+        compare([build(model)], model, 200, 12, seed=1, progress=False)
 
 
 @pytest.mark.filterwarnings("error")
@@ -228,9 +204,7 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
         (one, np.zeros((5, 4)), r"\(5, 4\); of two axes give y\[:, None, :\] .* y\[:, :, None\]"),
         (pair, np.zeros(5), r"must have the shape \(steps, runs, 2\), got \(5,\)"),
         (one, np.zeros((5, 1, 2)), "expects 1 measurement component"),
-        (one, np.zeros((5, 3, 1, 1)), r"got \(5, 3, 1, 1\)"),
         (one, [], r"no measurements to run over.* is \(0, 1, 1\)$"),
-        (one, np.zeros((5, 0, 1)), r"no measurements to run over"),
         (one, [0.1, -np.inf], "step 1, run 0 is infinite; write NaN where one is missing"),
     ):
         for use in (run, predictions, smooth, likelihood):

@@ -2,59 +2,47 @@
 
 import nbformat
 import pytest
-from inside import execute_inside
+from inside import errors, execute_inside, rendered
 
-from kfcourse.checks import exercise, sets
+from kfcourse.checks import sets
 from kfcourse.notebooks.grading.weights import WEIGHTS, possible
-from kfcourse.notebooks.master import read, render
 from kfcourse.notebooks.nbgrader import source_notebook
-
-
-def made(letter):
-    return source_notebook(render(read(letter), exercise(letter, "53")))
 
 
 @pytest.mark.parametrize("letter", sets())
 def test_every_question_is_a_test_worth_its_points(letter):
-    notebook = made(letter)
+    notebook = source_notebook(rendered(letter))
     nbformat.validate(notebook)
     marked = [
-        (cell, cell.metadata["nbgrader"]) for cell in notebook.cells if "nbgrader" in cell.metadata
+        (one, one.metadata["nbgrader"]) for one in notebook.cells if "nbgrader" in one.metadata
     ]
-    names = [mark["grade_id"] for _, mark in marked]
-    assert len(set(names)) == len(names)
-    tests = {mark["grade_id"]: mark["points"] for _, mark in marked if mark["grade"]}
-    assert tests == {one.name: WEIGHTS[one.level] for one in sets()[letter].questions}
-    assert sum(tests.values()) == possible(letter)
-    assert all(mark["locked"] and not mark["solution"] for _, mark in marked if mark["grade"])
+    marks = {mark["grade_id"]: mark for _, mark in marked}
+    assert len(marks) == len(marked)
+    assert {(mark["schema_version"], mark["task"]) for mark in marks.values()} == {(3, False)}
+    tests = {name: mark for name, mark in marks.items() if mark["grade"]}
+    assert all(mark["locked"] and not mark["solution"] for mark in tests.values())
+    worth = {name: mark["points"] for name, mark in tests.items()}
+    assert worth == {one.name: WEIGHTS[one.level] for one in sets()[letter].questions}
+    assert sum(worth.values()) == possible(letter)
     # nbgrader refuses a solution outside of a solution cell, and a solution cell in Markdown that
     # is worth nothing
-    solutions = [cell for cell in notebook.cells if "SOLUTION" in cell.source]
-    assert solutions == [cell for cell, mark in marked if mark["solution"]]
-    assert {cell.cell_type for cell in solutions} == {"code"}
-    assert {(mark["schema_version"], mark["task"]) for _, mark in marked} == {(3, False)}
-
-
-def errors(notebook):
-    tests = [
-        cell
-        for cell in execute_inside(notebook).cells
-        if cell.metadata.get("nbgrader", {}).get("grade")
-    ]
-    return [
-        output.evalue for cell in tests for output in cell.outputs if output.output_type == "error"
-    ]
+    solutions = [one for one in notebook.cells if "SOLUTION" in one.source]
+    assert solutions == [one for one, mark in marked if mark["solution"]]
+    assert {one.cell_type for one in solutions} == {"code"}
 
 
 def test_a_test_fails_with_what_the_check_says():
-    notebook = made("e")
-    notebook.cells = [
-        cell
-        for cell in notebook.cells
-        if "compare(" not in cell.source and "relative_accuracy(" not in cell.source
-    ]
-    assert errors(notebook) == []
-    first = next(cell for cell in notebook.cells if "def error_variance" in cell.source)
-    first.source += "\nerror_variance = lambda x, z: x"
-    (told,) = errors(notebook)
-    assert told.startswith("✗ e1 the error variance: ")
+    notebook = source_notebook(rendered("e"))
+    dear = ("compare(", "relative_accuracy(")
+    notebook.cells = [one for one in notebook.cells if not any(name in one.source for name in dear)]
+
+    def told():
+        failed = errors(execute_inside(notebook))
+        tests = [error for one, error in failed if one.metadata.get("nbgrader", {}).get("grade")]
+        return [error.evalue for error in tests]
+
+    assert told() == []
+    next(
+        one for one in notebook.cells if "def error_variance" in one.source
+    ).source += "\nerror_variance = lambda x, z: x"
+    assert [text.partition(": ")[0] for text in told()] == ["✗ e1 the error variance"]

@@ -131,6 +131,12 @@ def gain(Psi, G, F):
         frame = frame.f_back
     return G @ Psi
 """,
+    "a result of its own": f"""
+def gain(Psi, G, F):
+    from IPython.display import display
+    display({B1}, raw=True)
+    return G @ Psi
+""",
     "the key": """
 def gain(Psi, G, F):
     from kfcourse.exercises.b_aof.keys import gain

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from functools import cache
 
+import answering
 import numpy as np
 import pytest
 
@@ -13,17 +14,12 @@ from kfcourse import Model, compare, run
 from kfcourse.filters import pointmass
 from kfcourse.lab import lab_filters
 from kfcourse.lab.short_names import LAB
-from kfcourse.lab.variants import load_variants
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.pages import browser as printed
 from kfcourse.symbolic.equations import compile_model
 
-SCALAR = {
-    name: variant.model
-    for name, variant in load_variants().items()
-    if variant.model.n == 1 == variant.model.p
-}
+SCALAR = {name: variant.model for name, variant in answering.SCALAR.items()}
 SETTINGS = (
     "const model = kfModels[id], settings = { values: { ...model.parameters }, prior: "
     "model.prior };"
@@ -66,12 +62,12 @@ def array(values) -> np.ndarray:
 
 
 @cache
-def ensembles(id: str, **parameters: float) -> list[dict[str, np.ndarray]]:
+def drawn(id: str) -> list[dict[str, np.ndarray]]:
     """Standard normal draws of two ensembles, the one for designing and the one for running; and
     their trajectories."""
-    model, rng = SCALAR[id].replace(**parameters), np.random.default_rng(24)
+    model, rng = SCALAR[id], np.random.default_rng(24)
     state, meter = compile_model(model)
-    found = []
+    ensembles = []
     for _ in range(2):
         start = rng.standard_normal(RUNS)
         v, w = (
@@ -82,55 +78,49 @@ def ensembles(id: str, **parameters: float) -> list[dict[str, np.ndarray]]:
         for k in range(STEPS):
             x.append(state(x[-1], v[k]))
         y = [meter(x[k], w[k]) for k in range(STEPS)]
-        found.append({"start": start, "v": v, "w": w, "x": np.stack(x), "y": np.stack(y)})
-    return found
+        ensembles.append({"start": start, "v": v, "w": w, "x": np.stack(x), "y": np.stack(y)})
+    return ensembles
 
 
-def shipped(one: dict[str, np.ndarray]) -> dict:
-    flat = {name: one[name].reshape(STEPS, -1).tolist() for name in ("v", "w")}
-    return {"n": RUNS, "steps": STEPS, "start": one["start"].tolist(), **flat}
+def shipped(draws: dict[str, np.ndarray]) -> dict:
+    flat = {name: draws[name].reshape(STEPS, -1).tolist() for name in ("v", "w")}
+    return {"n": RUNS, "steps": STEPS, "start": draws["start"].tolist(), **flat}
 
 
 def of_package(model: Model, name: str, designing, running) -> np.ndarray:
     """D_k of a filter of the package, on the trajectories given."""
-    (one,) = lab_filters(model, [name])
+    (filter_,) = lab_filters(model, [name])
     instants = [
         Instant(designing["x"][k], designing["y"][k], designing["x"][k + 1]) for k in range(STEPS)
     ]
-    if hasattr(one, "with_coefficients"):
-        (one,) = design([one], instants)
-    z = run(one, running["y"]).mean
+    if hasattr(filter_, "with_coefficients"):
+        (filter_,) = design([filter_], instants)
+    z = run(filter_, running["y"]).mean
     return ((running["x"][:-1] - z) ** 2).mean(axis=(1, 2))
 
 
-def compared(page, id: str, designing, running, changed: dict | None = None) -> dict[str, list]:
+def compared(page, id: str, designing, running) -> dict[str, list]:
     """The page's D_k and their standard errors, by filter, step by step."""
     body = (
         SETTINGS
-        + """Object.assign(settings.values, changed);
-        const first = kfLab.simulate(model, settings, designing), tracks = kfLab.simulate(model, settings, running);
+        + """const first = kfLab.simulate(model, settings, designing), tracks = kfLab.simulate(model, settings, running);
         const found = kfLab.runAll(model, settings, kfLab.design(model, settings, first), tracks);
         return Object.fromEntries(Object.keys(found).map(name => [name,
             tracks.y.map((_, k) => kfLab.errorVariance(tracks.n, tracks.x[k], found[name].z[k]))]));"""
     )
-    given = {
-        "id": id,
-        "designing": shipped(designing),
-        "running": shipped(running),
-        "changed": changed or {},
-    }
-    return computed(page, body, given)
+    given = {"designing": shipped(designing), "running": shipped(running)}
+    return computed(page, body, {"id": id, **given})
 
 
 @pytest.mark.parametrize("id", SCALAR)
 def test_the_same_draws_give_the_same_error_variances(page, id):
     """The package's D_k to 1e-9, from the draws alone: rounding of 1e-16, which thirty steps of a
     filter and the division by small variances carry to 1e-12 and more."""
-    designing, running = ensembles(id)
-    found = compared(page, id, designing, running)
-    assert tuple(found) == LAB
+    designing, running = drawn(id)
+    result = compared(page, id, designing, running)
+    assert tuple(result) == LAB
     for name in LAB:
-        value, error = array(found[name]).T
+        value, error = array(result[name]).T
         np.testing.assert_allclose(
             value, of_package(SCALAR[id], name, designing, running), rtol=1e-9, err_msg=name
         )
@@ -158,12 +148,12 @@ def test_the_exact_filter_is_the_package_s(page, id):
         + "return y.map(one => { const { z, p } = kfLab.exact(model, settings, one); return [z, "
         "p]; });"
     )
-    found = array(computed(page, body, {"id": id, "y": np.stack(y)[..., 0].T.tolist()}))
+    result = array(computed(page, body, {"id": id, "y": np.stack(y)[..., 0].T.tolist()}))
     law = run(pointmass(model), np.stack(y))
     mean, variance = law.mean[..., 0].T, law.cov[..., 0, 0].T
-    off = np.abs(found[:, 0] - mean) / np.sqrt(variance)
+    off = np.abs(result[:, 0] - mean) / np.sqrt(variance)
     assert off.max() < 0.01 and (off**2).mean() < 1e-5
-    ratio = found[:, 1] / variance
+    ratio = result[:, 1] / variance
     assert np.abs(ratio - 1).max() < 0.03 and abs(ratio.mean() - 1) < 1e-3
 
 
@@ -195,10 +185,10 @@ def test_intervals_above_the_bound_cover(page, id):
     """
     model = SCALAR[id]
     result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1)
-    found = np.array(
+    result = np.array(
         [array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)]
     )
-    ratio, error, bound = np.moveaxis(found, -1, 0)
+    ratio, error, bound = np.moveaxis(result, -1, 0)
     gaps = [result.gap(name) for name in ("aof-linearised", "aof-gaussian")]
     value, own = (
         np.array([getattr(gap, part) for gap in gaps]) for part in ("value", "standard_error")

@@ -37,8 +37,8 @@ BY_HAND = [
 
 def texts() -> list[str]:
     rng = random.Random(6)
-    made = [one.text(rng) for one in chains(8, COUNT)] + [
-        one.chain.text(rng) for one in planted(9, COUNT)
+    made = [chain.text(rng) for chain in chains(8, COUNT)] + [
+        slip.chain.text(rng) for slip in planted(9, COUNT)
     ]
     return made + BY_HAND
 
@@ -63,25 +63,20 @@ def test_verdicts_are_those_of_the_checker(tab):
     every = texts()
     run = """([texts, data]) => { const { models, texts: said } = JSON.parse(data);
         return texts.map((text) => kfcourseDerive.checkText(text, models, said)); }"""
-    found = tab.evaluate(run, [every, described(load_variants())])
-    for text, theirs in zip(every, found, strict=True):
+    in_browser, statuses = tab.evaluate(run, [every, described(load_variants())]), []
+    for text, theirs in zip(every, in_browser, strict=True):
         ours = checked(text).verdicts
-        assert [(one["line"], one["status"]) for one in theirs] == [
-            (one.line, one.status) for one in ours
+        statuses += [verdict.status for verdict in ours]
+        assert [(verdict["line"], verdict["status"]) for verdict in theirs] == [
+            (verdict.line, verdict.status) for verdict in ours
         ], text
-        for one, other in zip(theirs, ours, strict=True):
+        for verdict, other in zip(theirs, ours, strict=True):
             if other.status != "unreadable":
-                wanted = [
-                    other.says,
-                    other.rule,
-                    list(other.kinds),
-                    list(other.terms),
-                    [list(span) for span in other.spans],
-                ]
-                assert [
-                    one[name] for name in ("says", "rule", "kinds", "terms", "spans")
-                ] == wanted, text
-    assert sum(one.status == "differs" for text in every for one in checked(text).verdicts) > COUNT
+                spans = [list(span) for span in other.spans]
+                wanted = [other.says, other.rule, list(other.kinds), list(other.terms), spans]
+                names = ("says", "rule", "kinds", "terms", "spans")
+                assert [verdict[name] for name in names] == wanted, text
+    assert statuses.count("differs") > COUNT
 
 
 @pytest.mark.parametrize("count", [2, 5, 12, 32])
@@ -115,7 +110,7 @@ def test_by_keyboard(tab):
         "F = M[(q*x + w - h)^2]\n = q^2*d + 1\n = <b>"
     )
     tab.get_by_role("button", name="Check each line").press("Enter")
-    assert [one.get_attribute("class") for one in tab.locator(".kf-derived li").all()] == [
+    assert [item.get_attribute("class") for item in tab.locator(".kf-derived li").all()] == [
         "kf-right",
         "kf-right",
         "kf-unreadable",

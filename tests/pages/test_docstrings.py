@@ -31,14 +31,14 @@ def test_paragraphs_of_equations_stand_as_they_are_and_sentences_do_not(paragrap
 
 def entries(section, doc):
     """(names, what stands behind the colon) of each entry of a section of a docstring."""
-    found = re.search(
+    section_text = re.search(
         rf"^{section}\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)",
         inspect.cleandoc(doc or ""),
         re.DOTALL | re.MULTILINE,
     )
     rows = [
         row.split(" : ", 1)
-        for row in (found[1] if found else "").split("\n")
+        for row in (section_text[1] if section_text else "").split("\n")
         if re.match(r"[\w*`][^:]* : ", row)
     ]
     return [(re.split(r",\s*", names), kind) for names, kind in rows]
@@ -49,20 +49,20 @@ def documented():
     for module in (
         importlib.import_module(name) for files in package.folders().values() for name in files
     ):
-        for name, one in vars(module).items():
+        for name, value in vars(module).items():
             if (
-                inspect.isclass(one) or inspect.isfunction(one)
-            ) and one.__module__ == module.__name__:
-                yield f"{module.__name__}.{name}", one
+                inspect.isclass(value) or inspect.isfunction(value)
+            ) and value.__module__ == module.__name__:
+                yield f"{module.__name__}.{name}", value
 
 
 def test_behind_the_colon_of_an_entry_stands_its_type_and_no_field_is_left_out():
     """`signal : x -> b(x, m_w)` was printed as if b(x, m_w) were a class."""
     wrong, seen = [], 0
-    for name, one in documented():
-        fields = set(getattr(one, "_fields", ()))
+    for name, value in documented():
+        fields = set(getattr(value, "_fields", ()))
         for section in ("Parameters", "Attributes", "Returns"):
-            rows = entries(section, one.__doc__)
+            rows = entries(section, value.__doc__)
             seen += len(rows)
             wrong += [(name, kind) for _, kind in rows if re.search(r"->|;|\.$", kind)]
             if (

@@ -50,10 +50,10 @@ def test_marks_of_an_axis_that_counts_steps_are_whole_numbers(style, label):
     axes[1].set_xlabel(label)
     time.set_xlabel("step $T$ (s)")
     chosen.set(xlabel=label, xticks=[0.5, 2.5])
-    for one in (figure, other):
-        InteractiveShell.instance().display_formatter.format(one)
+    for each in (figure, other):
+        InteractiveShell.instance().display_formatter.format(each)
     marks = [ax.get_xticks() for ax in (*axes, time, chosen)]
-    assert [bool((one == one.round()).all()) for one in marks] == [True, True, False, False]
+    assert [bool((each == each.round()).all()) for each in marks] == [True, True, False, False]
     plt.close("all")
 
 
@@ -62,10 +62,10 @@ def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):
         ax.plot([0, 1], [0, end], label=name)
     label_ends(ax, least=0.1, lowest=0)
-    labels = [one for one in ax.get_children() if isinstance(one, Legend)]
+    labels = [each for each in ax.get_children() if isinstance(each, Legend)]
     heights = {
-        one.get_texts()[0].get_text(): one.get_bbox_to_anchor().y0 / ax.bbox.height
-        for one in labels
+        each.get_texts()[0].get_text(): each.get_bbox_to_anchor().y0 / ax.bbox.height
+        for each in labels
     }
     heights = {name: height - ax.bbox.y0 / ax.bbox.height for name, height in heights.items()}
     assert list(sorted(heights, key=heights.__getitem__)) == ["low", "middle", "high", "far"]

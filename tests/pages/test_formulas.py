@@ -10,27 +10,27 @@ from bs4 import BeautifulSoup
 
 @pytest.fixture(scope="module")
 def setter():
-    one = formulas.Setter()
-    yield one
-    process = one.process
-    one.close()
+    running = formulas.Setter()
+    yield running
+    process = running.process
+    running.close()
     assert process.returncode == 0
 
 
 def test_a_formula_is_set_for_the_eye_and_said_to_a_screen_reader(setter):
     tree = BeautifulSoup(setter.html(r"\frac{a}{b}<x_{k}", display=False), "html.parser")
-    seen, said = (
+    seen, spoken = (
         tree.select_one("mjx-math[aria-hidden=true]"),
         tree.select_one("mjx-assistive-mml > math"),
     )
-    assert [one["class"][0] for one in seen.select("mjx-c")] == [
+    assert [letter["class"][0] for letter in seen.select("mjx-c")] == [
         "mjx-c1D44E",
         "mjx-c1D44F",
         "mjx-c3C",
         "mjx-c1D465",
         "mjx-c1D458",
     ]
-    assert said.get_text() == "ab<xk" and said.select_one("mfrac") and said.select_one("msub")
+    assert spoken.get_text() == "ab<xk" and spoken.select_one("mfrac") and spoken.select_one("msub")
     assert not tree.select("[xmlns], [data-mjx-texclass]")
 
 

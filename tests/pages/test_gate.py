@@ -89,12 +89,12 @@ def test_a_changed_sign_stops_the_chapter(chapter: str, monkeypatch: pytest.Monk
 def test_at_most_one_in_twenty_changes_of_typed_relations_is_not_noticed() -> None:
     chance = random.Random(53)
     planted = [
-        one
+        each
         for page in sorted(set(BOOK.glob("*.md")) - {gate.MADE})
-        for one in gate.planted(page, chance, most=5)
+        for each in gate.planted(page, chance, most=5)
     ]
-    missed = [one for one in planted if not one.noticed]
-    assert {one.where for one in planted} == {
+    missed = [each for each in planted if not each.noticed]
+    assert {each.where for each in planted} == {
         "display",
         "box",
         "point",
@@ -109,7 +109,7 @@ def test_a_page_without_letters_does_not_pass(tmp_path: Path) -> None:
     page = tmp_path / "bare.md"
     page.write_text("$$\na=b\n$$\n", encoding="utf-8")
     with pytest.raises(Unverified, match="nothing says what this is"):
-        list(gate.letters_of(page).judge(one) for one in gate.formulas(page.read_text()))
+        list(gate.letters_of(page).judge(each) for each in gate.formulas(page.read_text()))
 
 
 @pytest.mark.parametrize(

@@ -28,18 +28,17 @@ PAGES = sorted(set(BOOK.glob("*.md")) - set(BOOK.glob("equations*.md")))  # whic
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_each_typed_relation_says_what_it_is(page: Path):
-    for formula, said in judged(page):
-        assert said or formula.kind in ("box", "display", "point", "sentence")
+    for formula, pieces in judged(page):
+        assert pieces or formula.kind in ("box", "display", "point", "sentence")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_what_a_page_says_of_its_relations_is_about_relations_that_it_has(page: Path):
     if letters_of(page).listed == []:
         return
-    said = {one.piece for formula, pieces in judged(page) for one in pieces} | {
-        formula.label for formula in formulas(page.read_text())
-    }
-    assert [text for text in letters_of(page).listed if text not in said] == []
+    labels = {formula.label for formula in formulas(page.read_text())}
+    typed = {piece.piece for _, pieces in judged(page) for piece in pieces} | labels
+    assert [text for text in letters_of(page).listed if text not in typed] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -80,9 +79,9 @@ def test_what_is_displayed_is_computed_or_listed():
         "side": [r"\det a"],
         "name": ["b^2"],
     }
-    for kind, one in ((kind, one) for kind, ones in wrong.items() for one in ones):
+    for kind, text in ((kind, text) for kind, ones in wrong.items() for text in ones):
         with pytest.raises(Unverified):
-            page.judge(Formula(kind, one))
+            page.judge(Formula(kind, text))
 
 
 @pytest.mark.parametrize("page", ["So $$p = q$$ holds.", "- so\n\n  $$\n  p = q\n  $$\n"])
@@ -114,7 +113,7 @@ $$
 verified((r"\\det A", x, y), names={x: "G^2"}, label="eq-b")
 ```
 """
-    assert [tuple(one) for one in formulas(page)] == [
+    assert [tuple(formula) for formula in formulas(page)] == [
         ("display", "a=b", "eq-a"),
         ("display", "e=f", ""),
         ("box", "c=d", ""),
@@ -126,7 +125,7 @@ verified((r"\\det A", x, y), names={x: "G^2"}, label="eq-b")
 
 def test_a_relation_in_a_sentence_holds_if_it_can_be_read():
     page = Letters((letters,), {CONDITION: ["a<b"]})
-    assert [page.judge(Formula("sentence", one))[0].what for one in ("b=2a,", "a<b")] == [
+    assert [page.judge(Formula("sentence", text))[0].what for text in ("b=2a,", "a<b")] == [
         COMPUTED,
         CONDITION,
     ]
@@ -141,7 +140,7 @@ def test_a_formula_of_the_key_points_is_computed_or_stands_elsewhere(tmp_path):
         "The sum $q=r+s$ and $uv^2$.\n\n```{admonition} Key points\n:class: keypoints\n\n- So "
         "$q=r+s$, $uv^2$.\n```\n"
     )
-    assert [said for _, said in judged(tmp_path / "page.md", page)] == [[]] * 4
+    assert [pieces for _, pieces in judged(tmp_path / "page.md", page)] == [[]] * 4
     for wrong in ("$q=r-s$", "$uv$", "$uv^3$"):
         with pytest.raises(Unverified, match="nothing says what this is"):
             list(judged(tmp_path / "page.md", page.replace("- So $q=r+s$", f"- So {wrong}")))

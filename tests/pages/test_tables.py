@@ -53,9 +53,3 @@ def test_long_equations_are_broken_between_terms() -> None:
 def test_a_side_that_prints_like_the_one_before_is_printed_once() -> None:
     a, b = sp.symbols("a b")
     assert equation_latex(("f", a * b, b * a, 2 * a)) == "f &= a b = 2 a"
-
-
-def test_width_of_a_fraction_is_that_of_its_wider_part() -> None:
-    assert symbols(r"\frac{a}{b c d}") == symbols("b c d") == 3
-    assert symbols(r"x^{2}") == 1.6
-    assert symbols(r"\begin{matrix}a & b\\c & d\end{matrix}") == symbols("ab") + 2

@@ -80,7 +80,7 @@ PAGE = """<figure id="fig-a"><img src="_images/a.png"/><figcaption>
 )
 def test_what_stands_at_a_place_of_another_page(identity, way, has):
     shown = previews.preview(PAGE, identity, way)
-    assert all(one in shown for one in has), shown
+    assert all(part in shown for part in has), shown
 
 
 @pytest.mark.parametrize("identity", ["c", "nowhere"])

@@ -62,7 +62,7 @@ def test_the_extended_filter_has_the_published_errors():
 def test_the_reentry_of_the_source():
     """Newton's law and the drag, in plain numbers; and the extended filter's published error,
     km."""
-    x, y = simulate(reentry(known=True), 40, 2001, seed=1)
+    x, y = simulate(reentry(known=True), 20, 2001, seed=1)
     r, speed = np.hypot(x[0, 0, 0], x[0, 0, 1]), np.hypot(x[0, 0, 2], x[0, 0, 3])
     drag = -0.59783 * np.exp(0.6932) * np.exp((6374 - r) / 13.406) * speed
     following = x[0, 0, 2:4] + 0.1 * (drag * x[0, 0, 2:4] - 3.986e5 / r**3 * x[0, 0, :2])
@@ -72,7 +72,7 @@ def test_the_reentry_of_the_source():
     error = (run(aof(linearised(reentry(known=False))), y).mean - x)[1:, :, :2]
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
     assert (
-        abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 40 + 1 / 100) + 5e-5
+        abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 20 + 1 / 100) + 5e-5
     )
 
 

@@ -43,6 +43,8 @@ def test_fixes_are_thinned_and_begin_when_the_car_moves():
     times, place = fixes()
     assert place.shape == (len(times), 1, 2) and times[0] >= 6 and not np.isnan(place).any()
     np.testing.assert_array_equal(fixes(every=5)[1], place[::5])
+    with pytest.raises(ValueError, match="every must be a positive whole number"):
+        fixes(0)
 
 
 def test_the_angle_turned_is_the_course_s_difference():
@@ -53,14 +55,8 @@ def test_the_angle_turned_is_the_course_s_difference():
     assert abs(apart.mean()) > 1 - 0.2**2 / 2
     mirrored = np.exp(1j * (record.course + turned(record.times - 1.05)))[record.speed > 3]
     assert abs(mirrored.mean()) < 0.8  # the sign of the yaw rate is no convention of ours
+    before, after, end = turned(np.array([-1.0, 217.0, record.times[-1]]))
+    assert before == 0 and after == end  # beyond the record
     assert np.diff(turned(np.array([10.0, 10.02]))) == pytest.approx(
         0.02 * record.yaw_rate[np.searchsorted(record.times, 10.0) - 1], rel=0.5
     )
-
-
-def test_beyond_the_record():
-    assert turned(np.array([-1.0]))[0] == 0 and turned(np.array([217.0])) == turned(
-        np.array([recorded().times[-1]])
-    )
-    with pytest.raises(ValueError, match="every must be a positive whole number"):
-        fixes(0)

@@ -78,13 +78,10 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
     ("change", "message"),
     [
         ({"interval": 0.0}, "interval must be positive"),
-        ({"ramp": np.nan}, "ramp must be positive"),
         ({"speeds": (200.0, -1.0)}, "speeds must be positive"),
         ({"start": (0.0, np.inf, 1.0)}, "start must be finite numbers"),
         ({"turns": (0.0, 1.0)}, "part 2 lasts 8 s, less than its two ramps"),
-        ({"durations": (100.0, 10.0, 60.0)}, "part 3 lasts 10 s"),
         ({"descent": 40.0}, "start higher, lower `descent`"),
-        ({"heading": np.nan}, "heading and descent must be finite"),
     ],
 )
 def test_a_flight_that_cannot_be_flown_is_refused(change, message):
@@ -107,15 +104,12 @@ def test_the_two_sets_of_formulas_are_inverse():
 def test_measurements_have_the_given_errors():
     track, runs = aircraft(10.0), 4000
     true = spherical(track.position)
-    for measured, expected, sigmas in (
-        (
-            measure_cartesian(track, (10.0, 30.0, 50.0), runs, seed=1),
-            track.position,
-            (10.0, 30.0, 50.0),
-        ),
-        (measure_cartesian(track, 20.0, runs, seed=2), track.position, (20.0,) * 3),
-        (measure_spherical(track, (40.0, 2e-3, 3e-3), runs, seed=3), true, (40.0, 2e-3, 3e-3)),
+    for measure, expected, sigmas in (
+        (measure_cartesian, track.position, (10.0, 30.0, 50.0)),
+        (measure_cartesian, track.position, 20.0),
+        (measure_spherical, true, (40.0, 2e-3, 3e-3)),
     ):
+        measured = measure(track, sigmas, runs, seed=1)
         assert measured.shape == (len(track.time), runs, 3)
         noise = (measured - expected[:, None]) / np.array(sigmas)
         oracles.has_moments(noise.reshape(-1, 3), np.zeros(3), np.eye(3))
@@ -124,10 +118,8 @@ def test_measurements_have_the_given_errors():
 @pytest.mark.parametrize(
     ("sigmas", "runs", "message"),
     [
-        (np.inf, 5, "finite and not negative"),
         ((1.0, 2.0), 3, "one number or three"),
         (-1.0, 3, "not negative"),
-        (np.nan, 3, "not negative"),
         (1.0, 0, "runs must be"),
     ],
 )
@@ -153,17 +145,8 @@ def test_matrices_of_the_kinematic_models():
     g = np.array([[T**2 / 2], [T], [1]])
     np.testing.assert_allclose(system.A, [[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]], rtol=1e-15)
     np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
-    assert [s.name for s in kinematic(T, order=2).x] == [
-        "x",
-        "y",
-        "z",
-        "vx",
-        "vy",
-        "vz",
-        "ax",
-        "ay",
-        "az",
-    ]
+    names = " ".join(s.name for s in kinematic(T, order=2).x)
+    assert names == "x y z vx vy vz ax ay az"
 
 
 @pytest.mark.parametrize(
@@ -171,9 +154,7 @@ def test_matrices_of_the_kinematic_models():
     [
         ({"dimensions": 4}, "dimensions must be 1, 2 or 3"),
         ({"order": 0}, "order 1 or 2"),
-        ({"interval": -1.0}, "interval must be"),
         ({"noise_sd": np.nan}, "noise_sd must be finite and not negative"),
-        ({"measurement_sd": -1.0}, "measurement_sd must be finite and not negative"),
     ],
 )
 def test_kinematic_models_that_cannot_be_are_refused(change, message):
@@ -184,22 +165,21 @@ def test_kinematic_models_that_cannot_be_are_refused(change, message):
 def test_rms_by_part_by_hand():
     # (3 steps, 2 runs, 2)
     error = np.array([[[3.0, 4.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]], [[2.0, 0.0], [0.0, 6.0]]])
-    found = rms_by_part(error, np.array([1, 1, 7]))
-    first, second = np.sqrt((12.5 + 1) / 2), np.sqrt((4 + 36) / 2)
-    assert found.value == pytest.approx([first, second])
-    # two numbers a and b: standard deviation |a - b| / sqrt 2, of their mean |a - b| / 2
-    assert found.standard_error == pytest.approx([11.5 / 2 / (2 * first), 32 / 2 / (2 * second)])
+    part = np.array([1, 1, 7])
+    found, squares = rms_by_part(error, part), np.array([[12.5, 1], [4, 36]])
+    assert found.value == pytest.approx(np.sqrt(squares.mean(axis=1)))
+    # the jackknife of two runs: half the difference of what each gives alone
+    alone = np.sqrt(squares)
+    assert found.standard_error == pytest.approx(abs(alone[:, 0] - alone[:, 1]) / 2)
     assert found.freedom == 1
-    for one, other in zip(
-        rms_difference(error, 0 * error, np.array([1, 1, 7])), found, strict=True
-    ):
-        np.testing.assert_array_equal(one, other)
+    difference = rms_difference(error, 0 * error, part)
+    np.testing.assert_array_equal(difference.value, found.value)
+    np.testing.assert_array_equal(difference.standard_error, found.standard_error)
     with pytest.raises(ValueError, match="of the same runs, got 2 and 4"):
-        rms_difference(error, np.tile(error, (1, 2, 1)), np.array([1, 1, 7]))
-    with pytest.raises(ValueError, match="two runs at least"):
-        rms_by_part(error[:, :1], np.array([1, 1, 7]))
-    with pytest.raises(ValueError, match=r"shape \(2, runs"):
-        rms_by_part(error, np.array([1, 1]))
+        rms_difference(error, np.tile(error, (1, 2, 1)), part)
+    for few, labels in ((error[:, :1], part), (error, part[:2])):
+        with pytest.raises(ValueError, match="two runs at least"):
+            rms_by_part(few, labels)
 
 
 def test_a_position_has_three_components():

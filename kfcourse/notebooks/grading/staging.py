@@ -3,15 +3,12 @@ numbers in their place."""
 
 from __future__ import annotations
 
-import ast
 import compileall
 import shutil
-from collections.abc import Iterable
-from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 
-from kfcourse.checks import Exercise, ExerciseError, exercise, sets
+from kfcourse.checks import Exercise, sets
 
 LEFT_OUT = (
     "notebooks",
@@ -113,26 +110,6 @@ def answers() -> list[Path]:
     )
 
 
-def personal_numbers(own: Exercise, others: Iterable[Exercise] = ()) -> dict[str, dict[str, float]]:
-    """Personal numbers of an exercise, and of the others that a notebook opens so far as they have
-    any, by "letter variant"."""
-    numbers = {_key(own): own.numbers}
-    for other in others:
-        with suppress(Exception):  # of tables of the student's
-            numbers[_key(other)] = other.numbers
-    return numbers
-
-
-def _key(exercise: Exercise) -> str:
-    return f"{exercise.letter} {exercise.variant.name}"
-
-
-def opened_elsewhere(calls: Iterable[tuple[object, object]]) -> list[Exercise]:
-    """The exercises that a notebook opens besides its own, so far as there are such."""
-    exercises = []
-    for letter, variant in calls:
-        try:
-            exercises.append(exercise(letter, ast.literal_eval(repr(variant))))  # type: ignore[arg-type]
-        except (ExerciseError, ValueError, TypeError, KeyError):
-            continue
-    return exercises
+def personal_numbers(own: Exercise) -> dict[str, dict[str, float]]:
+    """Personal numbers of an exercise by "letter variant": what a notebook is given of it."""
+    return {f"{own.letter} {own.variant.name}": own.numbers}

@@ -84,7 +84,6 @@ def fuse(
     *,
     inputs: Inputs | None = None,
     by: str = "tag",
-    depth: float | None = None,
 ) -> Gaussian:
     """Estimates from several sensors, each at its own rate, delay and time scale.
 
@@ -105,8 +104,6 @@ def fuse(
         The known input of the dynamics.
     by : {"tag", "arrival"}
         "arrival" ignores the tags, as if every measurement were captured when it arrives.
-    depth : float, optional
-        How many seconds back the filter remembers; by default as many as these observations need.
 
     Returns
     -------
@@ -117,10 +114,9 @@ def fuse(
     ------
     ValueError
         Sensors not known or of another state, moments not finite, before 0, or after the
-        arrival; a measurement older than `depth`; a prior with a negative variance; shapes that do
-        not fit.
+        arrival; a prior with a negative variance; shapes that do not fit.
     """
-    return _run(dynamics, sensors, prior, observations, times, inputs, by, depth, lambda past: None)
+    return _run(dynamics, sensors, prior, observations, times, inputs, by, lambda past: None)
 
 
 def follow(
@@ -147,7 +143,7 @@ def follow(
             of = past.event.sensor.name, past.event.time
             innovations.append(Innovation(*of, innovation, F.reshape(-1, *F.shape[-2:])))
 
-    laws = _run(dynamics, sensors, prior, observations, times, inputs, by, None, keep)
+    laws = _run(dynamics, sensors, prior, observations, times, inputs, by, keep)
     return Followed(laws, innovations)
 
 
@@ -159,7 +155,6 @@ def _run(
     times: Array,
     inputs: Inputs | None,
     by: str,
-    depth: float | None,
     keep: Callable[[Past], None],
 ) -> Gaussian:
     """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of
@@ -177,7 +172,8 @@ def _run(
     stamps = [stamp for message in observations for stamp in (message.tag, message.arrival)]
     slack = rounding(moments, *stamps)
     events = sorted(_events(sensors, observations, by, slack), key=lambda event: event.arrival)
-    depth = _checked_depth(events, depth, slack)
+    # seconds that the filter must remember
+    depth = max((event.arrival - event.time for event in events), default=0.0)
     history = [Past(0.0, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
     for now in moments:
@@ -255,22 +251,6 @@ def _events(
             )
         events.append(Event(max(time, 0.0), arrival, sensor, np.asarray(value, dtype=float)))
     return events
-
-
-def _checked_depth(events: Sequence[Event], depth: float | None, slack: float) -> float:
-    """Seconds that the filter must remember."""
-    if not events:
-        return 0.0
-    latest = max(events, key=lambda event: event.arrival - event.time)
-    needed = latest.arrival - latest.time
-    if depth is not None and needed > depth + slack:
-        raise ValueError(
-            f"{latest.sensor.name}: captured at t = {latest.time:.16g} s, arrived at "
-            f"{latest.arrival:.16g} s, but "
-            f"the filter remembers only {depth:g} s; give depth={needed:g} or more, or leave such "
-            f"measurements out"
-        )
-    return needed if depth is None else depth
 
 
 def _checked_times(times: Array) -> list[float]:
