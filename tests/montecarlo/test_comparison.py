@@ -371,9 +371,9 @@ def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
     base = np.linspace(1, 2, 200)
     for first, second in ((1, 1 + 1e-15), (1 + 1e-15, 1)):
         squares = {
-            "best": base,
             "also": first * (base[::-1] + 9),
             "same": second * (base[::-1] + 9),
+            "best": base,
         }
         result = by_hand(variant53, squares)
         assert [name for name, _ in result.ranking()] == ["best", "also", "same"]
