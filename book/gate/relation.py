@@ -130,11 +130,9 @@ class Reader:
     def compute(self, function: Callable[..., Value], *values: Value) -> Value:
         try:
             return function(*values)
-        except ERRORS as error:
-            if isinstance(error, Unread):
-                raise
-            self.failed = self.failed or error
-        except Unverified as error:
+        except Unread:
+            raise
+        except (*ERRORS, Unverified) as error:
             self.failed = self.failed or error
         return np.nan
 

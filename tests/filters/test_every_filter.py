@@ -409,7 +409,11 @@ MEMORY = "memory must be a positive whole number, got "
 NAN = float("nan")
 REFUSED = [  # what is called, with what: what the message says
     (lambda p: gated(aof(SCALAR), p), (0, 1, 1.5, NAN), "probability must lie between"),
-    (lambda n: gated(aof(SCALAR), patience=n), (0, 2.0, True, "3"), "patience must be a whole"),
+    (
+        lambda n: gated(aof(SCALAR), patience=n),
+        (0, 2.0, True, "3"),
+        "patience must be a positive whole number",
+    ),
     (lambda d: robust(SCALAR, degrees=d), (0, -1, NAN), "degrees must be positive"),
     (lambda c: robust(SCALAR, edge=c), (0, -1.0, NAN), "edge must be positive"),
     (lambda n: robust(SCALAR, rounds=n), (0, 1.5, True), "rounds must be a positive whole number"),

@@ -36,11 +36,9 @@ BY_HAND = [
 
 
 def texts() -> list[str]:
-    rng = random.Random(6)
-    made = [chain.text(rng) for chain in chains(8, COUNT)] + [
-        slip.chain.text(rng) for slip in planted(9, COUNT)
-    ]
-    return made + BY_HAND
+    rng, right = random.Random(6), chains(8, COUNT)
+    made = [*right, *(slip.chain for slip in planted(right, 9))]
+    return [chain.text(rng) for chain in made] + BY_HAND
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import importlib
 import inspect
 import re
 
-import docstrings
 import package
 import pytest
+from ext import docstrings
 
 pytestmark = pytest.mark.quick
 

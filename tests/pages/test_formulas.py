@@ -3,9 +3,9 @@ set."""
 
 from __future__ import annotations
 
-import formulas
 import pytest
 from bs4 import BeautifulSoup
+from ext import formulas
 
 
 @pytest.fixture(scope="module")

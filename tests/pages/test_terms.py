@@ -6,12 +6,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import previews
 import pytest
-import terms
+from ext import previews, terms
 
 pytestmark = pytest.mark.quick
-BOOK = Path(terms.__file__).parent
+BOOK = Path(terms.__file__).parents[1]
 
 
 def test_the_glossary_is_in_order_and_says_each_thing_once():

@@ -1,4 +1,4 @@
-"""The likelihood of a record: a dense normal density, the Nile's figure, and what has none."""
+"""The likelihood of a record: a dense normal density, and what has none."""
 
 import numpy as np
 import oracles
@@ -8,7 +8,6 @@ from kfcourse import Model, gaussian, likelihood, linearised, simulate, unscente
 from kfcourse.filters import aof, duof, iterated, kalman_filter
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
-from kfcourse.scenarios.benchmarks import local_level, nile
 
 pytestmark = pytest.mark.quick
 
@@ -36,11 +35,6 @@ def test_on_a_linear_model_it_is_the_density_of_the_whole_record(kind):
     ]
     # a 16 x 16 determinant against eight of 2 x 2
     np.testing.assert_allclose(found.sum(axis=0), expected, rtol=1e-11)
-
-
-def test_the_flow_of_the_nile_has_its_likelihood():
-    for build in FILTERS.values():
-        assert likelihood(build(local_level()), nile()).sum() == pytest.approx(-641.5856, abs=5e-5)
 
 
 # ---------------------------------------------------------------- the exact filter, and particles

@@ -102,11 +102,12 @@ def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
         "of_all": sp.Matrix([[both, x1]]),
         "constant": sp.Matrix([[sp.sqrt(2)]]),
         "vector": sp.Matrix([2 ** sp.Rational(1, 4)]),
+        "single": sp.Matrix([both]),
     }
-    code = compile_function("f", ARGUMENTS, outputs, ["x", "x_next", "vector"]).function
-    constants = [(1, 1), (50, 1)]
-    assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2), *constants]
-    assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2), *constants]
+    code = compile_function("f", ARGUMENTS, outputs, ["x", "x_next", "vector", "single"]).function
+    rest = [(1, 1), (50, 1), (50, 1)]
+    assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2), *rest]
+    assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2), *rest]
     np.testing.assert_allclose(code(x, p)[3], np.sqrt(2), rtol=1e-15)
     np.testing.assert_allclose(code(x, p)[4], 2**0.25, rtol=1e-15)
     np.testing.assert_allclose(code(x, p[0])[1], code(x, p)[1][0], rtol=1e-14)

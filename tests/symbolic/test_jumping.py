@@ -161,6 +161,12 @@ def test_what_does_not_fit_is_refused_in_words(changes, message):
         define(**changes)
 
 
+def test_a_lost_trajectory_spoils_no_other():
+    model = define(transition=[["1/(1 + x**2)", "x**2/(1 + x**2)"], [0.3, 0.7]])
+    rows = model.transition_of(np.array([[1.0], [np.nan]]), 0)
+    np.testing.assert_allclose(rows[0], [[0.5, 0.5], [0.3, 0.7]])
+
+
 def test_names_of_modes_are_set_as_text():
     model = define(modes={"sound": {"parameters": {"C": 1}}, "half_dead": {"parameters": {"C": 2}}})
     assert r"\text{mode half\_dead:}" in model.latex()

@@ -5,6 +5,8 @@ A picture that lacks a caption or a text is a warning, and warnings are errors.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from docutils import nodes
 from sphinx.util import logging
 
@@ -17,7 +19,7 @@ def check(app, doctree, name: str) -> None:
     if app.builder.format != "html":
         return
     for image in doctree.findall(nodes.image):
-        above = list(_ancestors(image))
+        above = list(ancestors(image))
         place = next((node for node in (image, *above) if node.line), name)
         figure = next((node for node in above if isinstance(node, nodes.figure)), nodes.figure())
         if not any(isinstance(child, nodes.caption) and child.astext().strip() for child in figure):
@@ -42,7 +44,8 @@ def renumber(app, env) -> None:
                 numbers.update((name, (place,)) for place, name in enumerate(numbers, 1))
 
 
-def _ancestors(node: nodes.Node):
+def ancestors(node: nodes.Node) -> Iterator[nodes.Element]:
+    """The elements around a node, from the nearest outwards."""
     while (node := node.parent) is not None:
         yield node
 

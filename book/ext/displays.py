@@ -16,6 +16,7 @@ from equations import BEYOND, COURSE
 from gate.page import Formula, Letters, Verdict, letters_file, letters_of, mark
 from sphinx.util import logging
 
+from ext.figures import ancestors
 from kfcourse.pages import Unverified
 
 BOXES = {"algorithm", "definition"}
@@ -31,7 +32,8 @@ def say(app, doctree) -> None:
     letters = letters_of(page)
     app.env.note_dependency(str(letters_file(page)))
     for display in list(doctree.findall(nodes.math_block)):
-        if not _made(display):
+        # what a cell has made says what it is by its own mark
+        if not any("cell_output" in node.get("classes", []) for node in ancestors(display)):
             relations = _judged(
                 letters, Formula("display", display.astext(), display.get("label") or ""), display
             )
@@ -44,14 +46,6 @@ def say(app, doctree) -> None:
             ]
             if relations:
                 box += _words(_counted(relations))
-
-
-def _made(node: nodes.Node) -> bool:
-    """Has a cell made it?  Then its own mark says what it is."""
-    while (node := node.parent) is not None:
-        if "cell_output" in node.get("classes", []):
-            return True
-    return False
 
 
 def _judged(letters: Letters, formula: Formula, node: nodes.Node) -> list[Verdict]:

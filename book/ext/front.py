@@ -11,7 +11,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kfcourse.pages.scenes import who_leads
 
-MAP = Path(__file__).with_name("front-map.json")
+MAP = Path(__file__).resolve().parents[1] / "front-map.json"
 FIRST = (2, 0.4)  # step and f/e shown first: variant 53
 
 

@@ -18,8 +18,10 @@ from equations import BEYOND, COURSE
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.docutils import SphinxDirective
 
+from ext.figures import ancestors
+
 PAGE = "glossary"
-GLOSSARY = Path(__file__).with_name("glossary.toml")
+GLOSSARY = Path(__file__).resolve().parents[1] / "glossary.toml"
 RUSSIAN = re.compile(r"[а-яё]", re.IGNORECASE)
 NOT_LINKED = (
     nodes.reference, nodes.title, nodes.literal, nodes.math, nodes.raw, nodes.caption, nodes.figure,
@@ -180,19 +182,11 @@ class FirstUses(SphinxPostTransform):
 def _running(text: nodes.Text) -> bool:
     """In a sentence of the page, not in a heading, a caption, a lead, the objectives, or what a
     cell prints."""
-    node, sentence = text.parent, False
-    while node is not None:
-        classes = node.get("classes", [])
-        if isinstance(node, NOT_LINKED) or {
-            "lead",
-            "objectives",
-            "cell_output",
-            "kf-chapter",
-        } & set(classes):
-            return False
-        sentence = sentence or isinstance(node, nodes.paragraph)
-        node = node.parent
-    return sentence
+    around = list(ancestors(text))
+    without = {"lead", "objectives", "cell_output", "kf-chapter"}
+    return any(isinstance(node, nodes.paragraph) for node in around) and not any(
+        isinstance(node, NOT_LINKED) or without & set(node.get("classes", [])) for node in around
+    )
 
 
 def setup(app) -> dict[str, bool]:

@@ -1,7 +1,7 @@
 """Sphinx extension: what the search page searches, the text of every section.
 
 Sphinx's own index knows words and pages, no text; and a page read from a file cannot load another
-to show some.  So beside the scripts of book/search/ this writes sections.js, a list of [address,
+to show some.  So beside the scripts of search/ this writes sections.js, a list of [address,
 page, section, text], which search.js searches and quotes.
 """
 

@@ -14,11 +14,13 @@ from pathlib import Path
 
 import contents
 from docutils import nodes
-from folds import FoldsBelow
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.writers.html5 import HTML5Translator
 
-HERE = Path(__file__).resolve().parent
+from ext.figures import ancestors
+from ext.folds import FoldsBelow
+
+BOOK = Path(__file__).resolve().parents[1]
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
 SIZE = re.compile(r"width: (\d+)px;(?: height: (\d+)px;)?")
 # a figure that answers, and whose place it takes
@@ -131,7 +133,7 @@ class Translator(HTML5Translator):
 
 
 def use_templates(app, config) -> None:
-    config.templates_path.insert(0, str(HERE / "_templates"))
+    config.templates_path.insert(0, str(BOOK / "_templates"))
 
 
 def complete(app, pagename: str, templatename: str, context: dict, doctree) -> None:
@@ -202,14 +204,12 @@ def _described(app, pagename: str, context: dict, doctree) -> str:
     )
 
 
-def _boxed(node: nodes.Node) -> bool:
-    while node is not None:
-        if isinstance(
-            node, (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)
-        ) or node.get("classes", []) == ["cell"]:
-            return True
-        node = node.parent
-    return False
+def _boxed(paragraph: nodes.paragraph) -> bool:
+    boxes = (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)
+    return any(
+        isinstance(node, boxes) or node.get("classes", []) == ["cell"]
+        for node in ancestors(paragraph)
+    )
 
 
 def write_not_found(app, exception) -> None:

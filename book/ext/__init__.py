@@ -1,0 +1,1 @@
+"""Sphinx extensions of the book: what the build makes of the chapters."""
