@@ -98,6 +98,7 @@ CONTAINED = r'y2 contains the angle psi.*"y": \["y2"\]}'
         ("2*psi*x2 + sin(psi) + w", {"x": ["psi"]}, CONTAINED),
         ("sin(psi) + x2*cos(2*psi + x2) + w", ["psi"], None),
         ("psi + w", ["psi", "y2"], None),
+        ("psi + w", ["x2", "y1"], None),  # psi is no angle here
         ("psi + w", {"x": ["psi"], "y": []}, None),  # whoever gives the key has decided
     ],
 )
