@@ -42,7 +42,8 @@ def test_right_chains_are_accepted_and_slips_named_by_their_term(seed, monkeypat
         assert len(report.verdicts) >= len(chain.lines)
         assert report.right, f"{text}\n\n{report}"
     slips = planted(made, seed)
-    assert len(slips) > 0.9 * COUNT and len({slip.kind for slip in slips}) > 5
+    # a short chain may have no place for a slip
+    assert len(slips) >= 0.8 * COUNT and len({slip.kind for slip in slips}) > 5
     for slip in slips:
         text = slip.chain.text(rng)
         report = check_text(text, find)
