@@ -48,13 +48,13 @@ def filterpy_loop(runs: int) -> Callable[[], object]:
 
     def work() -> None:
         for trajectory in y[:, :, 0].T:
-            one = ExtendedKalmanFilter(1, 1)
-            one.x, one.P, one.F = np.zeros((1, 1)), np.eye(1), np.array([[c]])
+            ekf = ExtendedKalmanFilter(1, 1)
+            ekf.x, ekf.P, ekf.F = np.zeros((1, 1)), np.eye(1), np.array([[c]])
             for measurement in trajectory:
-                one.R = np.array([[f**2 * one.x[0, 0] ** 4 + 1e-300]])
-                one.update(np.array([[measurement]]), lambda x: np.array([[g]]), lambda x: g * x)
-                one.Q = np.array([[e**2 * one.x[0, 0] ** 2]])
-                one.predict()
+                ekf.R = np.array([[f**2 * ekf.x[0, 0] ** 4 + 1e-300]])
+                ekf.update(np.array([[measurement]]), lambda x: np.array([[g]]), lambda x: g * x)
+                ekf.Q = np.array([[e**2 * ekf.x[0, 0] ** 2]])
+                ekf.predict()
 
     return work
 
@@ -80,7 +80,7 @@ def main() -> None:
     filters = lab_filters(model)
 
     def lab(names, runs) -> Callable[[], object]:
-        chosen = [one for one in filters if one.name in names]
+        chosen = [filter_ for filter_ in filters if filter_.name in names]
         return lambda: compare(
             chosen, model, runs, STEPS, seed=1, design_runs=runs, jobs=2, progress=False
         )
@@ -89,12 +89,14 @@ def main() -> None:
     print(f"filterpy EKF loop: {1e6 * loop:.1f} us a trajectory-step")
     for runs in options.runs:
         count = runs * STEPS
-        one = best(lab(["aof-linearised"], runs), options.repeats) / count
+        linearised_aof = best(lab(["aof-linearised"], runs), options.repeats) / count
         drawing = best(draw(4 * count), options.repeats)
         of_drawing = best(draw(4 * count), options.repeats, time.process_time)
         print(f"\n{runs} trajectories x {STEPS} steps")
-        print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step")
-        print(f"  filterpy's loop takes {loop / one:.0f} times as long")
+        print(
+            f"  linearised AOF, drawing included: {1e9 * linearised_aof:.1f} ns a trajectory-step"
+        )
+        print(f"  filterpy's loop takes {loop / linearised_aof:.0f} times as long")
         print(
             f"  drawing 4 normals a trajectory-step with one Generator: "
             f"{1e9 * drawing / count:.1f} ns"

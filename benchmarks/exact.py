@@ -35,15 +35,15 @@ def followed(
     processor."""
     exact = pointmass(model, accuracy)
     exact.step(exact.init(y.shape[1]), y[0])  # what is compiled once
-    state, found, panels, start = exact.init(y.shape[1]), [], [], time.process_time()
+    state, laws, panels, start = exact.init(y.shape[1]), [], [], time.process_time()
     for measured in y:
         state = exact.step(state, measured)
-        found.append(
+        laws.append(
             (state.posterior.mean[:, 0], np.sqrt(state.posterior.cov[:, 0, 0]), state.memory.error)
         )
         panels.append(len(state.memory.panels) / y.shape[1])
     spent = time.process_time() - start
-    mean, sd, stated = (np.array(column) for column in zip(*found, strict=True))
+    mean, sd, stated = (np.array(column) for column in zip(*laws, strict=True))
     return mean, sd, stated, float(np.mean(panels)), spent
 
 
@@ -55,14 +55,14 @@ def on_a_grid(y: np.ndarray, a, q, b, r, sd, half_width) -> tuple[np.ndarray, np
     """Means and deviations (steps, runs) on equidistant points, a, b and r as functions of them."""
     x = np.linspace(-half_width, half_width, 4001)
     kernel = np.exp(-0.5 * ((x[:, None] - a(x)) / q) ** 2)
-    density, found, spread = np.exp(-0.5 * (x[:, None] / sd) ** 2), [], np.reshape(r(x), (-1, 1))
+    density, laws, spread = np.exp(-0.5 * (x[:, None] / sd) ** 2), [], np.reshape(r(x), (-1, 1))
     for measured in y[..., 0]:
         density = density * np.exp(-0.5 * ((measured - b(x)[:, None]) / spread) ** 2) / spread
         density /= density.sum(axis=0)
         mean = x @ density
-        found.append((mean, np.sqrt(x**2 @ density - mean**2)))
+        laws.append((mean, np.sqrt(x**2 @ density - mean**2)))
         density = kernel @ density
-    mean, sd = np.moveaxis(np.array(found), 1, 0)
+    mean, sd = np.moveaxis(np.array(laws), 1, 0)
     return mean, sd
 
 

@@ -46,8 +46,10 @@ def filters_of(name: str) -> list[Filter | Design]:
 
 def designed(filters: Sequence[Filter | Design], ensemble: Ensemble, jobs: int) -> list[Filter]:
     """The filters, those that need it designed on the ensemble."""
-    ready = iter(design([one for one in filters if isinstance(one, Design)], ensemble, jobs))
-    return [next(ready) if isinstance(one, Design) else one for one in filters]
+    ready = iter(
+        design([filter_ for filter_ in filters if isinstance(filter_, Design)], ensemble, jobs)
+    )
+    return [next(ready) if isinstance(filter_, Design) else filter_ for filter_ in filters]
 
 
 def questions(result: Comparison) -> dict[str, list[Estimate]]:
@@ -69,8 +71,8 @@ def coverage(estimates: Sequence[Sequence[Estimate]]) -> tuple[float, float, flo
 
     Where the truth varies by rounding only (filters that coincide) there is nothing to be covered.
     """
-    values = np.array([[one.value for one in row] for row in estimates])
-    halves = np.array([[one.half_width() for one in row] for row in estimates])
+    values = np.array([[estimate.value for estimate in row] for row in estimates])
+    halves = np.array([[estimate.half_width() for estimate in row] for row in estimates])
     truth = np.nanmean(values, axis=0)
     varies = np.nanstd(values, axis=0) > 1e-10 * np.nanmax(np.abs(truth))
     hits = (np.abs(values - truth) <= halves)[:, varies]
@@ -94,9 +96,10 @@ def another_design(
     ]
     work = {"jobs": jobs, "progress": False}
     results = [
-        compare(designed(filters, one, jobs), model, runs, steps, 1, **work) for one in ensembles
+        compare(designed(filters, ensemble, jobs), model, runs, steps, 1, **work)
+        for ensemble in ensembles
     ]
-    names = [one.name for one in filters if isinstance(one, Design)]
+    names = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
     gaps = np.array([[result.gap(name).value for name in names] for result in results])
     widths: Array = np.array([2 * results[0].gap(name).half_width() for name in names])
     moved = gaps.std(axis=0, ddof=1) / widths
@@ -114,7 +117,7 @@ def line(name: str, seeds: int, runs: int, steps: int | None, designs: int, jobs
         questions(compare(ready, model, runs, steps, seed, **work)) for seed in range(1, 1 + seeds)
     ]
     cells = [
-        "{:6.3f} {:6.3f} {:6.2f}".format(*coverage([one[kind] for one in results]))
+        "{:6.3f} {:6.3f} {:6.2f}".format(*coverage([result[kind] for result in results]))
         for kind in results[0]
     ]
     moved = "{:6.2f} {:6.2f}".format(*another_design(filters, model, runs, steps, designs, jobs))

@@ -25,10 +25,10 @@ from kfcourse.laws import Array
 FILTERS = ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2")
 
 
-def run_all(one: Filter, y: Array) -> None:
-    state = one.init(y.shape[1])
+def run_all(filter_: Filter, y: Array) -> None:
+    state = filter_.init(y.shape[1])
     for measured in y:
-        state = one.step(state, measured)
+        state = filter_.step(state, measured)
 
 
 def main() -> None:
@@ -46,23 +46,23 @@ def main() -> None:
             simulate(model, options.runs, options.steps, seed=1).y,
         )
 
-        def cost(one: Filter, y: Array = y) -> float:
-            return best(lambda: run_all(one, y), options.repeats, time.process_time)
+        def cost(filter_: Filter, y: Array = y) -> float:
+            return best(lambda: run_all(filter_, y), options.repeats, time.process_time)
 
         plain = cost(aof(structures.best[0]))
         averaged = None if model.by_state else cost(JUMP_FILTERS["aof-averaged"].build(structures))
-        said = (
+        head = (
             f"{name}: {len(model.modes)} modes, n = {model.n}; plain AOF "
             f"{1e6 * plain / options.steps:.0f} us a step"
         )
-        print(f"{said} of {options.runs} trajectories")
+        print(f"{head} of {options.runs} trajectories")
         for short in FILTERS:
             try:
-                found = cost(JUMP_FILTERS[short].build(structures))
+                spent = cost(JUMP_FILTERS[short].build(structures))
             except NoClosedForm:
                 continue
-            beside = f", {found / averaged:4.1f} AOFs of the average" if averaged else ""
-            print(f"  {short:<20} {found / plain:5.1f} plain AOFs{beside}")
+            beside = f", {spent / averaged:4.1f} AOFs of the average" if averaged else ""
+            print(f"  {short:<20} {spent / plain:5.1f} plain AOFs{beside}")
 
 
 if __name__ == "__main__":

@@ -50,27 +50,30 @@ def chain(n: int, curved: bool) -> Model:
     """Each state is driven by the next, the last one by noise; the first is measured."""
     last = f"0.9*x{n} + 0.3*v" + (" - 0.1*sin(x1)" if curved else "")
     names = [f"x{i}" for i in range(1, n + 1)]
-    motion = [*(f"{one} + 0.2*{other}" for one, other in pairwise(names)), last]
+    motion = [*(f"{name} + 0.2*{other}" for name, other in pairwise(names)), last]
     return Model.define(
         motion, "x1 + 0.5*w", symbols={"x": names}, prior={"mean": [0] * n, "variance": np.eye(n)}
     )
 
 
-def seconds(work: Callable[[Filter, np.ndarray], object], one: Filter, y: np.ndarray) -> float:
+def seconds(work: Callable[[Filter, np.ndarray], object], filter_: Filter, y: np.ndarray) -> float:
     start = time.process_time()
-    work(one, y)
+    work(filter_, y)
     return time.process_time() - start
 
 
-def ratios(one: Filter, y: np.ndarray, repeats: int) -> str:
+def ratios(filter_: Filter, y: np.ndarray, repeats: int) -> str:
     """Microseconds of the filter for a step of a run; what the smoother costs beside it, the worst,
     and the likelihood."""
     times = np.array(
-        [[seconds(work, one, y) for work in (run, smooth, likelihood)] for _ in range(repeats + 1)]
+        [
+            [seconds(work, filter_, y) for work in (run, smooth, likelihood)]
+            for _ in range(repeats + 1)
+        ]
     )[1:]
-    back, told = (times[:, 1:] / times[:, :1]).T
+    back, evidence = (times[:, 1:] / times[:, :1]).T
     own = 1e6 * np.median(times[:, 0]) / np.prod(y.shape[:2])
-    return f"{own:8.3f} {np.median(back):5.2f} {back.max():5.2f} {np.median(told):5.2f}"
+    return f"{own:8.3f} {np.median(back):5.2f} {back.max():5.2f} {np.median(evidence):5.2f}"
 
 
 def main() -> None:
@@ -88,15 +91,15 @@ def main() -> None:
     )
     for kind, build in KINDS.items():
         for n in given.states:
-            one = (
+            filter_ = (
                 kalman_filter(chain(n, False))
                 if kind == "kalman"
                 else aof(build(chain(n, kind != "linear")))
             )
             cells = [
-                ratios(one, y, given.repeats)
+                ratios(filter_, y, given.repeats)
                 for runs in given.runs
-                for y in [simulate(one.model, runs, STEPS.get(runs, 6), seed=1).y]
+                for y in [simulate(filter_.model, runs, STEPS.get(runs, 6), seed=1).y]
             ]
             print(f"{kind:14} {n:2} " + "".join(f"{cell:>28}" for cell in cells), flush=True)
     lab = find_variant("53").model
@@ -107,8 +110,8 @@ def main() -> None:
         "53, exact, 200 runs": (pointmass(lab), many[:, :200]),
         "53, 500 particles, 20 runs": (particle(lab, 500), many[:8, :20]),
     }
-    for name, (one, y) in others.items():
-        print(f"{name:32} {ratios(one, y, given.repeats)}", flush=True)
+    for name, (filter_, y) in others.items():
+        print(f"{name:32} {ratios(filter_, y, given.repeats)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -60,8 +60,8 @@ def ours(time, y):
         prior={"mean": MEAN, "variance": VARIANCE},
         inputs={"dt": [*np.diff(time), 1.0]},
     )
-    one = gated(aof(linearised(model)))
-    return run(one, y[:, None]).mean[:, 0, :2], smooth(one, y[:, None]).mean[:, 0, :2]
+    filter_ = gated(aof(linearised(model)))
+    return run(filter_, y[:, None]).mean[:, 0, :2], smooth(filter_, y[:, None]).mean[:, 0, :2]
 
 
 def motion(dt):
@@ -118,7 +118,9 @@ def main() -> None:
                 [np.sqrt(((part - track.x[:, 0, :2]) ** 2).sum(axis=1).mean()) for part in places]
             )
         filtered, smoothed = np.array(errors).T
-        texts = [f"{np.median(one):8.2f} ({one.max():.2f})" for one in (filtered, smoothed)]
+        texts = [
+            f"{np.median(errors):8.2f} ({errors.max():.2f})" for errors in (filtered, smoothed)
+        ]
         name, size = program.__name__, lines(program) + more
         print(
             f"{name:10}  "

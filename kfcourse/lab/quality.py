@@ -289,7 +289,7 @@ def differences(result: Comparison) -> Finding:
     or at some step (`Comparison.verdicts`).  Value: the largest such difference over the error
     variance of the control."""
     control = result.error_variance(result.control).value
-    found = {
+    gaps = {
         (best, worst, f"at step {k}"): float(result.difference(worst, best).value[k] / control[k])
         for k, (best, _, worst) in enumerate(result.verdicts(1 - SIGNIFICANCE))
         if worst
@@ -298,11 +298,11 @@ def differences(result: Comparison) -> Finding:
     best, worst = ranked[0], ranked[-1]
     difference = result.mean_gap_difference(worst, best)
     if difference.p_value() < SIGNIFICANCE / len(ranked) ** 2:  # the pair was chosen
-        found[best, worst, "on average"] = float(difference.value)
-    if not found:
+        gaps[best, worst, "on average"] = float(difference.value)
+    if not gaps:
         error = f"the statistical error of {result.runs} trajectories"
         return Finding(False, f"no two filters differ by more than {error}", 0.0)
-    (best, worst, when), largest = max(found.items(), key=lambda item: item[1])
+    (best, worst, when), largest = max(gaps.items(), key=lambda item: item[1])
     names = f"{title(best)} and {title(worst)}"
     return Finding(True, f"{names} differ by {100 * largest:.2g} % {when}", largest)
 

@@ -218,8 +218,8 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
         return None
     known = [filter_ for filter_ in filters if filter_.name in result.names]
     runs = min(result.runs, RECOGNISED)
-    told = recognised(known, model, runs, result.steps, result.seed)
-    return told if told.share else None
+    modes = recognised(known, model, runs, result.steps, result.seed)
+    return modes if modes.share else None
 
 
 def _mathml(line: str) -> str:
