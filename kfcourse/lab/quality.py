@@ -291,13 +291,14 @@ def differences(result: Comparison) -> Finding:
     control = result.error_variance(result.control).value
     gaps = {
         (best, worst, f"at step {k}"): float(result.difference(worst, best).value[k] / control[k])
-        for k, (best, _, worst) in enumerate(result.verdicts(1 - SIGNIFICANCE))
+        for k, (best, _, worst) in enumerate(result.verdicts(1 - SIGNIFICANCE / 2))
         if worst
     }
     ranked = [name for name, _ in result.ranking()]
     best, worst = ranked[0], ranked[-1]
     difference = result.mean_gap_difference(worst, best)
-    if difference.p_value() < SIGNIFICANCE / len(ranked) ** 2:  # the pair was chosen
+    # the other half of it, for all n (n - 1) / 2 pairs, of which this one was chosen
+    if difference.p_value() < SIGNIFICANCE / len(ranked) ** 2:
         gaps[best, worst, "on average"] = float(difference.value)
     if not gaps:
         error = f"the statistical error of {result.runs} trajectories"

@@ -62,9 +62,11 @@ class Structures:
     def of(cls, model: Model | JumpModel) -> Structures:
         """Those of one of the models asked for last: comparison and report ask for the same, and
         a pilot takes seconds."""
-        kept = next((known for known in _ASKED if known.model is model), None) or cls(model)
-        _ASKED.append(kept)
-        return kept
+        for known in _ASKED:
+            if known.model is model:
+                return known
+        _ASKED.append(cls(model))
+        return _ASKED[-1]
 
     @cached_property
     def linearised(self) -> Any:

@@ -257,7 +257,13 @@ class Reader:
             raise self.fail(node, "a root of a negative number has no real value")
         if base.is_number and base and not 1 / MAX_NUMBER < abs(base) < MAX_NUMBER:
             raise self.fail(node, "the power of this number is too large or too small")
-        return base**exponent
+        result = base**exponent
+        # now, not at the end: numbers in a power of powers of powers would fill the memory
+        if degree(result) > MAX_DEGREE:
+            raise self.fail(
+                node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula"
+            )
+        return result
 
     def condition(self, node: ast.expr) -> Boolean:
         match node:
