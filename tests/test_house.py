@@ -189,7 +189,7 @@ def test_two_copies_of_the_project_are_not_mixed(tmp_path):
 # writes less lowers it.
 ROOMS = {
     "benchmarks": 5_000,
-    "book": 29_120,
+    "book": 29_140,
     "exercises": 41_750,
     "kfcourse/*.py": 6_490,
     "kfcourse/checks": 20_010,
@@ -203,8 +203,8 @@ ROOMS = {
     "kfcourse/pages": 9_550,
     "kfcourse/records": 6_300,
     "kfcourse/scenarios": 11_320,
-    "kfcourse/symbolic": 21_800,
-    "tests": 196_790,
+    "kfcourse/symbolic": 21_840,
+    "tests": 196_840,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -84,3 +84,13 @@ w = \begin{pmatrix}o^T&o^T&1\end{pmatrix}
 Q(t) = u\operatorname{expm}(Gt)v^T\Phi(t)^T
 b(t) = u\operatorname{expm}(Gt)w^T
 """
+
+# The correction of the MFOS for y = x + 0.1 x^2 + 0.4 w, over a sample.
+CORRECTION = r"""
+h_k = \lambda_k+0.1(\lambda_k^2+\Psi_k)
+G_k = 1+0.2\lambda_k
+F_k = G_k^2\Psi_k+0.02\Psi_k^2+0.16
+\sigma_k = \Psi_kG_k/F_k(y_k-h_k)
+H_k = C(x_k-\lambda_k,\sigma_k)/C(\sigma_k,\sigma_k)
+e_k = \mathsf M(x_k-\lambda_k-H_k\sigma_k)
+"""

@@ -2,8 +2,10 @@ r"""The letters of filters-that-remember.md: a filter that remembers two measure
 sample by second moments, and the recursion over the length of its window."""
 
 from gate.page import DEFINITION, NOTATION
+from gate.shared import CORRECTION
 
-windowed = r"""
+windowed = (
+    r"""
 x_1, y_1: sample 80          # the means below are those of a sample
 v, w: list 6 sample 80
 C(x, y) = \mathsf M(x-\mathsf Mx)(y-\mathsf My)
@@ -18,12 +20,9 @@ a = \begin{pmatrix}1\\0\end{pmatrix}
 b = \begin{pmatrix}0\\1\end{pmatrix}
 \lambda_1 = 0x_1
 \Psi_1 = 1+0x_1
-h_k = \lambda_k+0.1(\lambda_k^2+\Psi_k)
-G_k = 1+0.2\lambda_k
-F_k = G_k^2\Psi_k+0.02\Psi_k^2+0.16
-\sigma_k = \Psi_kG_k/F_k(y_k-h_k)
-H_k = C(x_k-\lambda_k,\sigma_k)/C(\sigma_k,\sigma_k)
-e_k = \mathsf M(x_k-\lambda_k-H_k\sigma_k)
+"""
+    + CORRECTION
+    + r"""
 z_k = \lambda_k+\mathsf M(x_k-\lambda_k)+H_k(\sigma_k-\mathsf M\sigma_k)
 \zeta_k = \begin{pmatrix}y_k\\y_{k-1}\end{pmatrix}
 D_k = \begin{pmatrix}d_k\\d_{k-1}\end{pmatrix}
@@ -40,6 +39,7 @@ n_{k+1} = \mathsf M(x_{k+1}-L_{k+1}s_k)
 "\tau(u_k,T_k)" of k = s_k
 keep: \lambda, \Psi, \sigma, H, e, z, y, h, G, F, L, n, u, \zeta, \Gamma, \chi, k, \tau(u_k,T_k)
 """
+)
 
 lengthened = r"""
 c: in .8 .9

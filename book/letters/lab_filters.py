@@ -2,7 +2,7 @@ r"""The letters of lab-filters.md: three filters on a sample, their fits by seco
 extended filter of a model with several components."""
 
 from gate.page import DEFINITION, NOTATION
-from gate.shared import EXTENDED
+from gate.shared import CORRECTION, EXTENDED
 
 SAMPLE = r"""
 x_1, y_1: sample 60         # the means below are those of a sample
@@ -42,12 +42,9 @@ optimal_structure = (
     + r"""
 \lambda_0 = 0x_1
 \Psi_0 = 1+0x_1
-h_k = \lambda_k+0.1(\lambda_k^2+\Psi_k)
-G_k = 1+0.2\lambda_k
-F_k = G_k^2\Psi_k+0.02\Psi_k^2+0.16
-\sigma_k = \Psi_kG_k/F_k(y_k-h_k)
-H_k = C(x_k-\lambda_k,\sigma_k)/C(\sigma_k,\sigma_k)
-e_k = \mathsf M(x_k-\lambda_k-H_k\sigma_k)
+"""
+    + CORRECTION
+    + r"""
 z_k = x_k-(x_k-\lambda_k-H_k\sigma_k-e_k)
 \Gamma_k = C(x_k,z_k)/C(z_k,z_k)
 \chi_k = \mathsf M(x_k-\Gamma_kz_k)

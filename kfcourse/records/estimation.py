@@ -124,8 +124,8 @@ def estimate(
     --------
     >>> from kfcourse.records import estimate
     >>> from kfcourse.scenarios.benchmarks import local_level, nile
-    >>> found = estimate(local_level(q=1000, r=10000), nile(), ["q", "r"], positive=["q", "r"])
-    >>> [round(value, 1) for value in found.value.tolist()], round(found.log_likelihood, 4)
+    >>> likeliest = estimate(local_level(q=1000, r=10000), nile(), ["q", "r"], positive=["q", "r"])
+    >>> [round(value, 1) for value in likeliest.value.tolist()], round(likeliest.log_likelihood, 4)
     ([1468.5, 15099.7], -641.5856)
     """
     expect(model, Model, "estimate")

@@ -264,6 +264,8 @@ class Model:
     def of_table(cls, table: Mapping[str, Any]) -> Model:
         """The model of a table such as [variants.53]: its keys are the arguments of `define`, but
         for title and steps."""
+        if not isinstance(table, Mapping) or not {"state", "meter"} <= set(table):
+            raise ModelError(f"expected a table with state and meter, got {shown(table)}")
         return cls.define(**{key: table[key] for key in table if key not in OF_A_VARIANT})
 
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
