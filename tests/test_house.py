@@ -196,7 +196,7 @@ ROOMS = {
     "kfcourse/continuous": 10_540,
     "kfcourse/derivations": 14_930,
     "kfcourse/filters": 33_350,
-    "kfcourse/lab": 19_890,
+    "kfcourse/lab": 19_910,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_240,
     "kfcourse/notebooks": 26_120,

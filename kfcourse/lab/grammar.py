@@ -18,6 +18,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from importlib import resources
+from itertools import islice
 from typing import Any, NamedTuple
 
 import joblib
@@ -32,6 +33,7 @@ PIECES = tomllib.loads(
     (resources.files("kfcourse.lab") / "grammar.toml").read_text(encoding="utf-8")
 )
 SCREEN = 10  # a candidate is first tried on that many times fewer trajectories: most are none
+CHUNK = 12  # candidates that are judged at once; of the last ones some are judged in vain
 SHAPES = 50  # up to so many variants all formulas are different; each so many more repeat once more
 PATIENCE = 20  # candidates for each variant wanted, before it is given up
 
@@ -120,24 +122,24 @@ def generate(
     variants: list[Variant] = []
     rejected: Counter[str] = Counter()
     shapes: Counter[str] = Counter()
-    tables = [propose(seed, index) for index in range(PATIENCE * wanted)]
-    parallel = joblib.Parallel(jobs, return_as="generator", pre_dispatch=2 * jobs)
-    judged = parallel(joblib.delayed(_judge)(table, runs, seed, ask) for table in tables)
-    with tqdm(desc="generating", total=wanted, unit="variant", disable=None) as bar:
-        for table, quality in zip(tables, judged, strict=False):
-            shape = json.dumps([table["state"], table["meter"]])
-            if reason := "linear" if quality.linear else next(iter(quality.faults), ""):
-                rejected[reason] += 1
-            elif shapes[shape] > wanted // SHAPES:
-                rejected["formulas of another one"] += 1
-            else:
-                shapes[shape] += 1
-                name = f"g{len(variants) + 1}"
-                variants.append(read_variant(name, table, "the grammar"))
-                bar.update()
-            if len(variants) == wanted:
-                break
-    judged.close()  # of those begun some were in vain
+    tables = (propose(seed, index) for index in range(PATIENCE * wanted))
+    bar = tqdm(desc="generating", total=wanted, unit="variant", disable=None)
+    with joblib.Parallel(n_jobs=jobs) as parallel, bar:
+        while len(variants) < wanted and (chunk := list(islice(tables, CHUNK))):
+            judged = parallel(joblib.delayed(_judge)(table, runs, seed, ask) for table in chunk)
+            for table, quality in zip(chunk, judged, strict=True):
+                shape = json.dumps([table["state"], table["meter"]])
+                if len(variants) == wanted:
+                    break
+                if reason := "linear" if quality.linear else next(iter(quality.faults), ""):
+                    rejected[reason] += 1
+                elif shapes[shape] > wanted // SHAPES:
+                    rejected["formulas of another one"] += 1
+                else:
+                    shapes[shape] += 1
+                    name = f"g{len(variants) + 1}"
+                    variants.append(read_variant(name, table, "the grammar"))
+                    bar.update()
     return Generated(variants, rejected)
 
 
