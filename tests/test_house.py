@@ -195,7 +195,7 @@ ROOMS = {
     "kfcourse/checks": 20_010,
     "kfcourse/continuous": 10_540,
     "kfcourse/derivations": 14_930,
-    "kfcourse/filters": 33_350,
+    "kfcourse/filters": 32_300,
     "kfcourse/lab": 19_910,
     "kfcourse/linear": 6_770,
     "kfcourse/montecarlo": 11_240,
