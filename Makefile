@@ -63,9 +63,12 @@ QUICK := tests/test_house.py tests/test_laws.py tests/symbolic tests/linear
 quick: lint
 	$(BIN)/pytest -q -n 0 -m quick $(QUICK)
 
+# The types of the package as it is installed: with the exercises in it.
+TYPED := _build/typed
 lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	rm -rf $(TYPED) && mkdir -p $(TYPED) && cp -r kfcourse $(TYPED) && cp -r exercises $(TYPED)/kfcourse
 	$(BIN)/mypy
 	$(BIN)/python .ci/columns.py
 
@@ -75,7 +78,7 @@ unit: install
 # Other cases each time; what fails is shown with the case, as small as can be.
 CASES := 20000
 fuzz: install
-	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py tests/derivations
+	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py tests/exercises/derivations
 
 # Executes every notebook of the built book once more and compares all outputs but pictures, which therefore are not drawn
 # again; so it does with the worked solutions of the exercises, for variants of different kinds: multiplicative noises, a sine

@@ -23,8 +23,8 @@ from myst_nb.core.read import is_myst_markdown_notebook, myst_nb_reader_plugin
 from nbclient.exceptions import DeadKernelError
 from nbformat import NotebookNode
 
-from kfcourse.notebooks.execution import first_error
-from kfcourse.notebooks.jobs import Job, Outcome, make, run_all
+from kfcourse.exercises.notebooks.execution import first_error
+from kfcourse.exercises.notebooks.jobs import Job, Outcome, make, run_all
 
 BOOK = Path(__file__).resolve().parent
 SETTINGS = yaml.safe_load((BOOK.parent / "_config.yml").read_text(encoding="utf-8"))["execute"]

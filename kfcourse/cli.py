@@ -1,6 +1,6 @@
 """The command line: `kfcourse lab 53`, `kfcourse variants`, `kfcourse estimate`, ...
 
-The instructor's commands are in `kfcourse.notebooks.commands`.
+The instructor's commands are in `kfcourse.exercises.commands`.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from pathlib import Path
 
 import click
 
-from kfcourse.checks.posing import unposed
-from kfcourse.derivations import check_text
-from kfcourse.derivations.setting import of_model
 from kfcourse.errors import NotFinite
+from kfcourse.exercises.checks.posing import unposed
+from kfcourse.exercises.derivations import check_text
+from kfcourse.exercises.derivations.setting import of_model
 from kfcourse.files import replacing_together, save
 from kfcourse.lab import admission, grammar, quality
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
@@ -116,7 +116,7 @@ class _Group(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         instructors = name in INSTRUCTORS
         return (
-            getattr(import_module("kfcourse.notebooks.commands"), name)
+            getattr(import_module("kfcourse.exercises.commands"), name)
             if instructors
             else self.commands.get(name)
         )

@@ -28,7 +28,7 @@ from sphinx import addnodes
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
-from kfcourse.checks import sets
+from kfcourse.exercises.checks import sets
 
 log = logging.getLogger(__name__)
 

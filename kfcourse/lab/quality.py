@@ -105,7 +105,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
     seed : int
     ask : callable, optional
         Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None;
-        `kfcourse.checks.posing.unposed`.
+        `kfcourse.exercises.checks.posing.unposed`.
     """
     if runs < FEWEST:
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")

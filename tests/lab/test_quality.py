@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import Model, cli, load_variants
-from kfcourse.checks.posing import unposed
+from kfcourse.exercises.checks.posing import unposed
 from kfcourse.lab import grammar, quality
 from kfcourse.lab.grammar import PIECES, generate, propose
 from kfcourse.lab.quality import (

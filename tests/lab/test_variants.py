@@ -6,9 +6,9 @@ import tomllib
 import pytest
 
 from kfcourse import Model, ModelError, NoClosedForm, gaussian, lab_filters, load_variants
-from kfcourse.checks import exercise
-from kfcourse.checks.exercises import ExerciseError
-from kfcourse.checks.posing import unposed
+from kfcourse.exercises.checks import exercise
+from kfcourse.exercises.checks.exercises import ExerciseError
+from kfcourse.exercises.checks.posing import unposed
 from kfcourse.filters import Design, Filter
 from kfcourse.lab import variants as of_variants
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title

@@ -11,6 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import JumpModel, cli, load_variants, simulate
+from kfcourse.exercises.notebooks import handing_out
+from kfcourse.exercises.notebooks.jobs import Outcome
 from kfcourse.filters import logic_dynamic, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, Structures, title
@@ -22,8 +24,6 @@ from kfcourse.lab.variants import (
     summary,
 )
 from kfcourse.montecarlo.modes import recognised
-from kfcourse.notebooks import handing_out
-from kfcourse.notebooks.jobs import Outcome
 
 JUMPS = {name: one for name, one in read_variants()[0].items() if isinstance(one.model, JumpModel)}
 OWN = """

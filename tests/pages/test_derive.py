@@ -5,21 +5,18 @@ from __future__ import annotations
 
 import json
 import random
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from browsers import offline
+from derivation_corpus import chains, planted
 
-from kfcourse.derivations.values import hermite
+from kfcourse.exercises.derivations.values import hermite
 from kfcourse.lab import load_variants
 from kfcourse.pages.derive import checked, described, field, shown
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tests" / "derivations"))
-from derivation_corpus import chains, planted  # noqa: E402
-
 STYLE = (ROOT / "book" / "_static" / "book.css").read_text(encoding="utf-8")
 COUNT = 12
 BY_HAND = [

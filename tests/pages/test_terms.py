@@ -23,13 +23,14 @@ def test_the_glossary_is_in_order_and_says_each_thing_once():
         )  # pages without MathJax show it
     contents = (BOOK / "_toc.yml").read_text(encoding="utf-8")
     manual = {
-        f"manual/{path.name.replace('_', '-')}" for path in (BOOK.parent / "exercises").iterdir()
+        f"manual/{path.name.replace('_', '-')}"
+        for path in (BOOK.parent / "exercises" / "sets").iterdir()
     }
     for term in terms.terms():
         assert term.page in manual or f"- file: {term.page}\n" in contents, term
         page = term.page.removeprefix("manual/").replace("-", "_")
         path = (
-            BOOK.parent / "exercises" / page / "statement.md"
+            BOOK.parent / "exercises" / "sets" / page / "statement.md"
             if term.page in manual
             else BOOK / f"{term.page}.md"
         )
