@@ -20,7 +20,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
-	@echo "make page NAME=drive   one page alone, to look at: half a minute; links to other pages lead nowhere"
+	@echo "make page NAME=beyond/drive   one page alone, to look at: half a minute; links to other pages lead nowhere"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
 	@echo "make nightly     the same, and the tests marked slow: coverage of intervals, hostile processes, all pages"
 	@echo "make quick       lint, types and the quick tests of the house, of formulas and of linear filters: a minute of CPU"
@@ -43,7 +43,7 @@ book: install
 # Of what Sphinx says, all but that the other pages are not there.
 PAGE := _build/page/_build/html
 page: install
-	@test -f "book/$(NAME).md" || { echo "make page NAME=drive: the name of a file book/NAME.md without its ending" >&2; exit 1; }
+	@test -f "book/$(NAME).md" || { echo "make page NAME=beyond/drive: the name of a file book/NAME.md without its ending" >&2; exit 1; }
 	@test -z "$$(find kfcourse exercises -name '*.py' -newer _build/page/_toc.yml 2>&1)" || rm -rf _build/page
 	@rm -rf $(PAGE) && mkdir -p _build/page _build/sample
 	@printf 'format: jb-book\nroot: intro\nchapters:\n  - file: %s\n' "$(NAME)" > _build/page/_toc.yml
@@ -90,7 +90,7 @@ notebooks: install
 	  $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env $(CHOSEN) tests/test_book.py _build/jupyter_execute _build/solutions
 
 literature: install
-	$(BIN)/python book/chapters.py literature
+	$(BIN)/python book/chapters.py beyond/literature
 
 figure: install
 	$(BIN)/python book/readme_figure.py

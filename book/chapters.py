@@ -3,7 +3,7 @@
 Sphinx would execute them one after another.  The worked solutions of the lab manual run in the same
 processes.
 
-    python book/chapters.py literature      execute one chapter, and print what its cells print
+    python book/chapters.py beyond/literature      execute one chapter, print what its cells say
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def executed(folder: Path) -> Iterator[tuple[str, NotebookNode]]:
     cache = get_cache(folder)
     for path in notebooks():
         _, notebook = cache.merge_match_into_notebook(myst_nb_reader_plugin(str(path)))
-        yield path.stem, notebook
+        yield path.relative_to(BOOK).with_suffix("").as_posix(), notebook
 
 
 def show(name: str) -> int:

@@ -67,5 +67,5 @@ def table() -> str:
         for name, files in folders().items()
     }
     about["kfcourse"] = ALONE
-    rows = [f"| {{doc}}`{name} <package/{name}>` | {text} |" for name, text in about.items()]
+    rows = [f"| {{doc}}`{name} </package/{name}>` | {text} |" for name, text in about.items()]
     return "\n".join(["| folder | what lives there |", "| --- | --- |", *rows, ""])

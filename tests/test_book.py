@@ -103,6 +103,14 @@ def test_style_sheets_load_only_local_files() -> None:
         ), sheet
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("stratonovich", "course/stratonovich"), ("particles", "beyond/grid")]
+)
+def test_an_old_address_leads_on(old: str, new: str) -> None:
+    page = (HTML / f"{old}.html").read_text(encoding="utf-8")
+    assert f'location.replace("{new}.html" + location.hash)' in page
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_notebook_is_executed_without_errors(page: str) -> None:
     notebook = nbformat.read(EXECUTED / f"{page}.ipynb", as_version=4)
@@ -307,7 +315,7 @@ ONLY_MARKED = """() => {
 THEMES = ["light", "dark"]
 COLOURS = ["color-contrast", "link-in-text-block"]
 # has formulas and code of all kinds, and is looked at before it is thinned out, too
-WHOLE = "stratonovich"
+WHOLE = "course/stratonovich"
 AUDIT = (
     f"(colours) => ({FOUND})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, "
     f"{{ enabled: false }}])) }})"
@@ -333,10 +341,10 @@ def show_on(tab, media: str, width: int) -> None:
 KINDS = [
     "intro",
     WHOLE,
-    "comparison",
-    "consistency",
+    "course/comparison",
+    "course/consistency",
     "manual/b-aof",
-    "glossary",
+    "reference/glossary",
     "package/kfcourse.filters",
     "search",
     "404",
@@ -400,7 +408,7 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
 
 def test_the_keyboard_reaches_the_text_first(window):
     tab, _ = window
-    tab.goto((HTML / "linearisation.html").as_uri())
+    tab.goto((HTML / "course/linearisation.html").as_uri())
     tab.keyboard.press("Tab")
     assert tab.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
     assert tab.evaluate("document.activeElement.checkVisibility()")
@@ -418,7 +426,7 @@ def test_a_reference_shows_what_it_leads_to(window):
     stays a link."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    laid_out(tab, "comparison")
+    laid_out(tab, "course/comparison")
     box = tab.locator("#kf-preview")
     formula = tab.locator('article a.reference.internal[href^="#equation-"]').first
     figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
@@ -455,7 +463,7 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
     """From another page, and on the same one; on paper all is open (below)."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    page, name = (HTML / "literature.html").as_uri(), "fig-literature-bearings"
+    page, name = (HTML / "beyond/literature.html").as_uri(), "fig-literature-bearings"
     tab.goto(page)
     folds = tab.locator("details.kf-more")
     assert folds.count() == 4 and not any(folds.evaluate_all("all => all.map((e) => e.open)"))
@@ -497,7 +505,7 @@ COME_TO_REST = """(name) => new Promise((rest) => {
 })"""
 
 
-@pytest.mark.parametrize("page", ["comparison", "manual/b-aof"])
+@pytest.mark.parametrize("page", ["course/comparison", "manual/b-aof"])
 def test_contents_on_a_telephone(browser, page):
     """They cover the text, a link closes them, and it arrives."""
     with browser.new_context(offline=True, viewport={"width": 390, "height": 844}) as context:
@@ -512,7 +520,7 @@ def test_contents_on_a_telephone(browser, page):
         assert not drawer.is_visible()
 
 
-@pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])
+@pytest.mark.parametrize("page", [WHOLE, "course/comparison", "manual/r-loop"])
 def test_a_formula_stays_with_its_comma(page):
     """And with its bracket: no text that begins behind a formula begins with a mark."""
     html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
@@ -583,11 +591,13 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
     matched = re.search(
-        r'class="kf-count" href="(equations[^"#]*.html)#([^"]+)"',
+        r'class="kf-count" href="([^"#]*equations[^"#]*.html)#([^"]+)"',
         (HTML / f"{page}.html").read_text(encoding="utf-8"),
     )
     if matched:
-        assert f'id="{matched[2]}"' in (HTML / matched[1]).read_text(encoding="utf-8")
+        assert f'id="{matched[2]}"' in (HTML / page).parent.joinpath(matched[1]).read_text(
+            encoding="utf-8"
+        )
 
 
 def displayed(page: str) -> list[str]:
@@ -606,7 +616,7 @@ def displayed(page: str) -> list[str]:
 
 def test_the_pages_of_all_equations_have_them_all():
     """Whether typed, verified, or printed from the package: numbered or not."""
-    known = set(displayed("equations")) | set(displayed("equations-beyond"))
+    known = set(displayed("reference/equations")) | set(displayed("reference/equations-beyond"))
     assert [
         (page, each) for page in NOTEBOOKS for each in displayed(page) if each not in known
     ] == []
@@ -616,7 +626,7 @@ def test_the_pages_of_all_equations_have_them_all():
 
 def test_a_chapter_is_downloaded_as_a_notebook(window):
     tab, _ = window
-    tab.goto((HTML / "ten-minutes.html").as_uri())
+    tab.goto((HTML / "course/ten-minutes.html").as_uri())
     with tab.expect_download() as started:
         tab.get_by_role("link", name="notebook").click()
     notebook = nbformat.read(started.value.path(), as_version=4)
@@ -637,13 +647,17 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
 @pytest.mark.parametrize(
     ("words", "page", "section"),
     [
-        ("stratonovich equation", "stratonovich.html", ""),
+        ("stratonovich equation", "course/stratonovich.html", ""),
         ("variant 53 Russian report", "sample-report.html", ""),
-        ("что такое невязки", "glossary.html", "term-innovation"),  # which says "невязка"
-        ("what is the DUOF", "glossary.html", "term-two-step-conditionally-optimal-filter"),
-        ("why does the EKF diverge", "glossary.html", "term-extended-kalman-filter"),
-        ("alpha-beta", "radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
-        ("likelihood", "what-the-data-say.html", "likelihood-from-innovations"),
+        ("что такое невязки", "reference/glossary.html", "term-innovation"),  # which says "невязка"
+        (
+            "what is the DUOF",
+            "reference/glossary.html",
+            "term-two-step-conditionally-optimal-filter",
+        ),
+        ("why does the EKF diverge", "reference/glossary.html", "term-extended-kalman-filter"),
+        ("alpha-beta", "course/radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
+        ("likelihood", "beyond/what-the-data-say.html", "likelihood-from-innovations"),
         ("smoothing_error", "package/kfcourse.records.html", "module-kfcourse.records.smoothing"),
     ],
 )
@@ -684,7 +698,7 @@ def test_an_address_that_does_not_exist(window):
         assert Path(unquote(urlsplit(address).path)).exists(), address
 
 
-@pytest.mark.parametrize("page", ["intro", "stratonovich", "manual/b-aof"])
+@pytest.mark.parametrize("page", ["intro", "course/stratonovich", "manual/b-aof"])
 def test_descriptions_and_icon(page):
     head = (HTML / f"{page}.html").read_text(encoding="utf-8").split("</head>")[0]
     for name in ("description", "og:title", "og:description", "og:type"):

@@ -204,7 +204,9 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
 
 
 def test_the_chapter_shows_the_shipped_table():
-    page = (Path(__file__).parents[2] / "book" / "models-that-jump.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "book" / "beyond/models-that-jump.md").read_text(
+        encoding="utf-8"
+    )
     (block,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     (name, shown), *_ = tomllib.loads(block)["variants"].items()
     assert shown == {key: value for key, value in JUMPS[name].table.items() if key != "title"}

@@ -41,7 +41,7 @@ def test_a_book_of_which_nothing_has_changed_stays(tree, capsys):
     for made in (
         "book/manual/a-set.md",
         "book/package/folder.md",
-        "book/equations.md",
+        "book/reference/equations.md",
         "kfcourse/__pycache__/c.pyc",
         "tests/d.py",
     ):

@@ -328,7 +328,7 @@ def test_a_link_keeps_the_settings(opened):
 
 def test_its_file_is_read_by_the_command(opened, tmp_path, monkeypatch):
     """With the model of the chapter, as it stands there."""
-    chapter = (Path(live.__file__).parents[2] / "book" / "live-track.md").read_text(
+    chapter = (Path(live.__file__).parents[2] / "book" / "beyond/live-track.md").read_text(
         encoding="utf-8"
     )
     (tmp_path / "pointer.toml").write_text(

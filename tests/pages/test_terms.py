@@ -45,7 +45,7 @@ def test_the_notation_has_the_terms_of_the_glossary():
     """Each Russian term of its tables is one of the glossary's, in a row that names it."""
     known = {form: term for term in terms.terms() for form in map(terms.bare, term.ru)}
     seen, column = 0, None
-    for row in (BOOK / "notation.md").read_text(encoding="utf-8").splitlines():
+    for row in (BOOK / "course/notation.md").read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in re.sub(r"\$[^$]*\$|[*`]", " ", row).strip("|").split("|")]
         if "Russian" in row and row.startswith("|"):
             column = next(i for i, cell in enumerate(cells) if "Russian" in cell)

@@ -476,8 +476,8 @@ SET = ExerciseSet(
     Path(__file__).parent,
     QUESTIONS,
     chapters=(
-        "structural-functions",
-        "linearisation",
+        "course/structural-functions",
+        "course/linearisation",
     ),
     angles=("x", "y"),
 )

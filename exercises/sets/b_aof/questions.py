@@ -217,7 +217,7 @@ SET = ExerciseSet(
     Path(__file__).parent,
     QUESTIONS,
     chapters=(
-        "lab-filters",
-        "linearisation",
+        "course/lab-filters",
+        "course/linearisation",
     ),
 )

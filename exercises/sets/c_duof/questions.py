@@ -161,5 +161,5 @@ SET = ExerciseSet(
     "The two-step conditionally optimal filter",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("lab-filters",),
+    chapters=("course/lab-filters",),
 )

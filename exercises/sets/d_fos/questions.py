@@ -133,5 +133,9 @@ QUESTIONS = (
 )
 
 SET = ExerciseSet(
-    "d", "Filters of optimal structure", Path(__file__).parent, QUESTIONS, chapters=("lab-filters",)
+    "d",
+    "Filters of optimal structure",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("course/lab-filters",),
 )

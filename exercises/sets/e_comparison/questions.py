@@ -147,6 +147,6 @@ SET = ExerciseSet(
     "Comparison by Monte Carlo",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("comparison",),
+    chapters=("course/comparison",),
     angles=("y",),
 )

@@ -190,7 +190,7 @@ SET = ExerciseSet(
     "The exact filter on a grid",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("stratonovich", "comparison"),
+    chapters=("course/stratonovich", "course/comparison"),
     numbers=companion_numbers,
     angles=("x", "y"),  # its companion has none
 )

@@ -268,5 +268,5 @@ SET = ExerciseSet(
     "The extended Kalman filter and its consistency",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("linearisation", "consistency"),
+    chapters=("course/linearisation", "course/consistency"),
 )

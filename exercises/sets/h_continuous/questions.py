@@ -239,7 +239,7 @@ SET = ExerciseSet(
     "The continuous-time filter",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("continuous",),
+    chapters=("course/continuous",),
     numbers=continuous_numbers,
     about_variant=False,
 )

@@ -169,8 +169,8 @@ SET = ExerciseSet(
     Path(__file__).parent,
     QUESTIONS,
     chapters=(
-        "track-2d",
-        "numerics",
+        "course/track-2d",
+        "course/numerics",
     ),
     numbers=track_numbers,
     about_variant=False,

@@ -167,8 +167,8 @@ SET = ExerciseSet(
     Path(__file__).parent,
     QUESTIONS,
     chapters=(
-        "radar-tracking",
-        "models-that-jump",
+        "course/radar-tracking",
+        "beyond/models-that-jump",
     ),
     numbers=radar_numbers,
     about_variant=False,

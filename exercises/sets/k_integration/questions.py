@@ -157,7 +157,7 @@ SET = ExerciseSet(
     "Inertial system and satellite receiver",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("integration", "four-sensors"),
+    chapters=("course/integration", "beyond/four-sensors"),
     numbers=integration_numbers,
     about_variant=False,
 )

@@ -210,7 +210,7 @@ SET = ExerciseSet(
     "Rates and time tags",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("time-tags", "four-sensors"),
+    chapters=("course/time-tags", "beyond/four-sensors"),
     numbers=timing_numbers,
     about_variant=False,
 )

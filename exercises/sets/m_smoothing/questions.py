@@ -200,7 +200,7 @@ SET = ExerciseSet(
     "Smoothing and likelihood",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("looking-back", "what-the-data-say", "outliers"),
+    chapters=("beyond/looking-back", "beyond/what-the-data-say", "beyond/outliers"),
     numbers=record_numbers,
     about_variant=False,
 )

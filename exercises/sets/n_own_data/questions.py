@@ -164,7 +164,7 @@ SET = ExerciseSet(
     "Your own data",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("drive",),
+    chapters=("beyond/drive",),
     numbers=record_numbers,
     about_variant=False,
 )

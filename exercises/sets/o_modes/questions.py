@@ -203,7 +203,7 @@ SET = ExerciseSet(
     "Modes: which model holds?",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("models-that-jump",),
+    chapters=("beyond/models-that-jump",),
     numbers=modes_numbers,
     about_variant=False,
 )

@@ -168,6 +168,10 @@ SET = ExerciseSet(
     "Find the slip",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("structural-functions", "filters-that-remember", "models-that-jump"),
+    chapters=(
+        "course/structural-functions",
+        "beyond/filters-that-remember",
+        "beyond/models-that-jump",
+    ),
     about_variant=False,
 )

@@ -144,7 +144,7 @@ SET = ExerciseSet(
     "Loop, lock-in, slips",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("discriminator", "cycle-slips"),
+    chapters=("course/discriminator", "beyond/cycle-slips"),
     numbers=loop_numbers,
     about_variant=False,
 )

@@ -119,7 +119,7 @@ SET = ExerciseSet(
     "Between measurements",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("between-measurements", "stratonovich-continuous"),
+    chapters=("beyond/between-measurements", "beyond/stratonovich-continuous"),
     numbers=between_numbers,
     about_variant=False,
 )
