@@ -103,6 +103,9 @@ class Filter:
     mixture : callable, optional
         Where what it expects of a measurement is a mixture of normal laws: the state before it to
         their weights (runs, M), and the M expectations.
+    drawn : callable, optional
+        Where it is another law: its own state, a number and a Generator to so many states from each
+        posterior, (number, runs, n), and their modes (number, runs).
     """
 
     name: str
@@ -114,6 +117,7 @@ class Filter:
     evidence: Evidence | None = None
     look_back: LookBack | None = None
     mixture: Callable[[State], tuple[Array, Sequence[Measurement]]] | None = None
+    drawn: Callable[[State, int, np.random.Generator], tuple[Array, Array]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

@@ -334,9 +334,10 @@ class Comparison:
         """M[Integral (P(y) - [y >= y_k])^2 dy] per step, (steps,), P the predicted distribution:
         the less the better; in the units of y, the sum over its components.
 
-        M|e| of a filter that claims to be sure.  NaN for filters whose predictions are neither
-        normal laws nor mixtures of some (T. Gneiting and A. Raftery, Strictly proper scoring
-        rules, J. Am. Stat. Assoc. 102, 2007).
+        M|e| of a filter that claims to be sure.  The exact filter's and the particles' are had by
+        draws from their predictions.  NaN for gated filters and others whose predictions are
+        neither normal laws nor mixtures of some (T. Gneiting and A. Raftery, Strictly proper
+        scoring rules, J. Am. Stat. Assoc. 102, 2007).
         """
         return self._score("crps", name, minus, steps)
 

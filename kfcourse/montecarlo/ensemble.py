@@ -128,6 +128,26 @@ def simulate(
     return Trajectories(np.stack(x), np.stack(y))
 
 
+def foretold(
+    model: Model | JumpModel,
+    k: int,
+    drawn: tuple[Array, Array] | None,
+    rng: np.random.Generator,
+    number: int,
+) -> Array:
+    """Measurements y_k (number, p) of so many states x_{k-1} (number, n) in modes (number,), moved
+    and measured as in an ensemble; of the first step by the prior."""
+    jumps = isinstance(model, JumpModel)
+    advance = _jumping(model) if jumps else _moving(model)
+    before, now = zip(*_noises(model, rng, 2, number), strict=True)
+    if drawn is None:
+        state = _initial(model, number, np.random.SeedSequence(rng.integers(2**63)), None)
+    else:
+        moved = advance(k - 1, *drawn[: 1 + jumps], *before)
+        state = [moved.x_next, moved.mode_next][: 1 + jumps]
+    return advance(k, *state, *now).y
+
+
 def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:
     """Prior over the law that `stratified` draws from, at initial states x (N, n): (N,), between 0
     and 2.

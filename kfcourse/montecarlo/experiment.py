@@ -375,7 +375,10 @@ def run_batches(
                     x = near(instant.x, state.posterior.mean, angles)
                     sums.record(i, k, x, state.posterior, weight, starts)
                     if scores is not None:
-                        both = scored(filters[i], scores, before[i], instant.y, state)
+                        both = scored(
+                            filters[i], scores, before[i], instant.y, state,
+                            sample.model, sample.seeds[0],
+                        )  # fmt: skip
                         sums.log_score[i, k], sums.crps[i, k] = (
                             np.add.reduceat(weight * values, starts) for values in both
                         )

@@ -8,7 +8,8 @@ of a mixture of N(h_i, s_i^2) with the weights w_i is
 
     sum w_i a(y - h_i, s_i) - sum w_i w_j a(h_i - h_j, sqrt(s_i^2 + s_j^2)) / 2,
 
-and of a single normal law a(y - h, s) - s / sqrt(pi): T. Gneiting and A. Raftery (2007); E. Grimit
+and of a single normal law a(y - h, s) - s / sqrt(pi).  Of any other law it is
+M|y - Y| - M|Y - Y'| / 2 with Y and Y' drawn from it: T. Gneiting and A. Raftery (2007); E. Grimit
 and others, Q. J. R. Meteorol. Soc. 132 (2006).
 """
 
@@ -17,29 +18,65 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import ndtr
 
+from kfcourse.angles import Components, difference
 from kfcourse.filters.base import Filter, State
 from kfcourse.laws import Array, log_density
+from kfcourse.montecarlo.ensemble import foretold
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
+
+DRAWS = 16  # of what is neither a normal law nor a mixture: they widen the interval by 4 %
 
 
 def scored(
-    chosen: Filter, structure: Structure, before: State, y: Array, after: State
+    chosen: Filter,
+    structure: Structure,
+    before: State,
+    y: Array,
+    after: State,
+    model: Model | JumpModel,
+    seed: np.random.SeedSequence,
 ) -> tuple[Array, Array]:
     """Both scores of the measurement y (runs, p) for each trajectory, (runs,), by the filter's own
-    structural functions, or these; NaN for the second where the prediction is neither a normal law
-    nor a mixture of some."""
+    structural functions, or these; NaN for the second where the prediction cannot be had."""
+    log = chosen.evidence(before, y, after) if chosen.evidence else None
+    if chosen.drawn is not None:
+        key = (*seed.spawn_key, 1, before.step)
+        rng = np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=key))
+        return log, crps_of_draws(y, _expected(chosen, before, model, rng), model.angles.y)
     if chosen.mixture is not None:
         weights, laws = chosen.mixture(before)
-    elif chosen.evidence is not None:
-        return chosen.evidence(before, y, after), np.full(len(y), np.nan)
+    elif log is not None:
+        return log, np.full(len(y), np.nan)
     else:
         expects = (chosen.structure or structure).at(before.step).measure
         weights, laws = np.ones((1, 1)), [after.expected or expects(*before.predicted)]
-    log = chosen.evidence(before, y, after) if chosen.evidence else log_density(laws[0], y)
+        log = log_density(laws[0], y)
     errors = np.stack([law.innovation(y) for law in laws], axis=-1)
     variances = [np.diagonal(law.F, axis1=-2, axis2=-1) for law in laws]
     deviations = np.sqrt(np.stack(np.broadcast_arrays(y, *variances)[1:], axis=-1))
     return log, crps(errors, deviations, weights[:, None]).sum(axis=-1)
+
+
+def _expected(
+    chosen: Filter, before: State, model: Model | JumpModel, rng: np.random.Generator
+) -> Array:
+    """Measurements drawn from what a filter expects, (DRAWS, runs, p)."""
+    shape = DRAWS, len(before.posterior.mean)
+    drawn = None
+    if before.step > 0:
+        x, mode = chosen.drawn(before, DRAWS, rng)
+        drawn = x.reshape(-1, x.shape[-1]), mode.ravel()
+    return foretold(model, before.step, drawn, rng, DRAWS * shape[1]).reshape(*shape, -1)
+
+
+def crps_of_draws(y: Array, drawn: Array, angles: Components) -> Array:
+    """Of a law of which some measurements were drawn, (draws, runs, p): M|y - Y| - M|Y - Y'| / 2
+    without bias, Y' the next draw; summed over the components, (runs,)."""
+    missed = np.abs(difference(y, drawn, angles))
+    apart = np.abs(difference(np.roll(drawn, 1, axis=0), drawn, angles))
+    return (missed - apart / 2).mean(axis=0).sum(axis=-1)
 
 
 def crps(errors: Array, deviations: Array, weights: Array) -> Array:
