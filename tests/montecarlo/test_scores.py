@@ -9,6 +9,7 @@ import scipy
 from kfcourse import Model, compare, gaussian, linearised
 from kfcourse.continuous import sampled
 from kfcourse.filters import aof, duof, gpb2, imm, kalman_filter, particle, pointmass
+from kfcourse.lab import find_variant
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.experiment import Sample, batch_sizes, states
 from kfcourse.montecarlo.scores import crps, scored
@@ -142,6 +143,15 @@ def test_modes_are_judged_by_their_mixture():
     assert more.value > 4 * more.standard_error
     less = compared.crps("imm", minus="aof-linearised", steps=slice(None))
     assert less.value < -4 * less.standard_error
+
+
+def test_where_the_density_is_nothing_at_a_point():
+    """Variant 53's, at x = 0: its logarithm there is -1e100."""
+    model = find_variant("53").model
+    filters = [pointmass(model), aof(gaussian(model))]
+    compared = compare(filters, model, 500, 3, seed=3, scores=gaussian(model))
+    apart = compared.crps("aof-exact", minus="aof-gaussian")
+    assert (apart.value < 4 * apart.standard_error).all()
 
 
 def test_modes_are_drawn_with_their_states():

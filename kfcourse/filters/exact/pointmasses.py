@@ -111,7 +111,8 @@ class PointMass(NamedTuple):
         mode = above.sum(axis=-1)
         place = np.arange(runs) * modes + mode
         points = np.linspace(-1, 1, PARTS + 1)
-        density = np.exp(self.panels[:, :Q] @ (legendre.legvander(points, Q - 1) @ COEFFICIENT).T)
+        of_values = legendre.legvander(points, Q - 1) @ COEFFICIENT
+        density = np.maximum(np.exp(self.panels[:, :Q]) @ of_values.T, 0.0)
         size = (self.panels[:, RIGHT] - self.panels[:, LEFT])[:, None] / PARTS
         mass = (size * (density[:, 1:] + density[:, :-1]) / 2).ravel()
         up_to = np.concatenate([[0.0], mass.cumsum()])
