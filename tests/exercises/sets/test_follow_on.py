@@ -7,8 +7,16 @@ from kfcourse.exercises.checks import Derivation, exercise, sets
 from kfcourse.exercises.checks.editing import rebound, uses
 from kfcourse.exercises.checks.question import ForVariant
 
+DEAR = {"f4-f2", "f4-f3"}  # the exact filter again for each mistake
 FOLLOWING = [
-    pytest.param(letter, question, step, earlier, id=f"{question.name}-{earlier.name}")
+    pytest.param(
+        letter,
+        question,
+        step,
+        earlier,
+        id=(name := f"{question.name}-{earlier.name}"),
+        marks=[pytest.mark.slow] if name in DEAR else [],
+    )
     for letter, one in sets().items()
     for question in one.questions
     if (step := question.key.step if isinstance(question.key, ForVariant) else question.key)

@@ -21,7 +21,6 @@ from kfcourse.exercises.checks.editing import _changed, changes
 from kfcourse.exercises.notebooks.master import read, render, solution
 
 SEED = int(os.environ.get("MUTANTS", WEEK))
-EACH = 3  # changes of a solution
 SIZE = {"too-large", "too-small"}
 
 
@@ -47,9 +46,10 @@ def written(lab):
     return space, sources
 
 
-@pytest.fixture(scope="module")
-def outcomes():
-    """For each mutant its question, its source, and what the check says of it."""
+@pytest.fixture(scope="module", params=[1, pytest.param(5, marks=pytest.mark.slow)])
+def outcomes(request):
+    """For each mutant, so many of a solution, its question, its source, and what the check says of
+    it."""
     matplotlib.use("agg")
     rows = []
     for letter in sets():
@@ -61,7 +61,7 @@ def outcomes():
         for question in lab.questions.values():
             possible = mutants(sources[question.function])
             for source in random.Random(f"{SEED}{question.name}").sample(
-                possible, min(EACH, len(possible))
+                possible, min(request.param, len(possible))
             ):
                 names = dict(space)
                 exec(source, names)
@@ -89,9 +89,9 @@ def test_no_check_fails_in_itself(outcomes):
 
 
 def test_most_are_told_what_is_wrong(outcomes):
-    """By a known mistake or a hint.  Of 371 5 % are merely wrong; of the 250 here give or take 1.4:
-    four of these below."""
-    told = Counter(
+    """By a known mistake or a hint.  Of 371 5 % are merely wrong; of the 75 or so here give or take
+    2.5: four of these below."""
+    named = Counter(
         bool(set(result.diagnosis) - SIZE) for *_, result, _ in outcomes if result.status == "wrong"
     )
     merely = [
@@ -99,4 +99,4 @@ def test_most_are_told_what_is_wrong(outcomes):
         for _, source, result, _ in outcomes
         if result.status == "wrong" and not set(result.diagnosis) - SIZE
     ]
-    assert told[True] >= 0.89 * sum(told.values()), merely
+    assert named[True] >= 0.85 * sum(named.values()), merely
