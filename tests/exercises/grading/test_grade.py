@@ -58,11 +58,11 @@ def fakes_checks():
     """Check cells that print a tick, with outputs that say passed."""
     notebook = solved(*BOTH_WRONG)
     for name in ("b1", "b2"):
-        one = cell(notebook, f'task.check("{name}"')
+        check = cell(notebook, f'task.check("{name}"')
         passed = {"question": name, "status": "passed", "diagnosis": [], "message": "right"}
         data = {MIME: passed, "text/plain": "✓"}
-        one.source = "print('✓ right')"
-        one.outputs = [nbformat.v4.new_output("execute_result", data, execution_count=1)]
+        check.source = "print('✓ right')"
+        check.outputs = [nbformat.v4.new_output("execute_result", data, execution_count=1)]
     return notebook
 
 
@@ -73,9 +73,9 @@ def deletes():
         ("def gain", "solve(F, cross)", "solve(F, product(G, Psi))"),
         ("def gain", "def product(A, B):\n    return A @ B"),
     )
-    own = [one for one in code(notebook) if not one.source.startswith(("task.check", "import"))]
-    for one in own:
-        one.metadata.clear()
+    own = [each for each in code(notebook) if not each.source.startswith(("task.check", "import"))]
+    for each in own:
+        each.metadata.clear()
     return notebook | {"cells": own}
 
 
@@ -86,8 +86,8 @@ def merges():
         cell(notebook, start)
         for start in ("def gain", "def correct", 'task.check("b1"', 'task.check("b2"')
     )
-    first.source = "\n".join(one.source for one in (first, *others))
-    return notebook | {"cells": [one for one in notebook.cells if one not in others]}
+    first.source = "\n".join(each.source for each in (first, *others))
+    return notebook | {"cells": [each for each in notebook.cells if each not in others]}
 
 
 def imports():
@@ -103,7 +103,7 @@ def without_gain(kind):
     notebook = solved(("def correct", "K = gain(Psi, G, F)", "K = gain(Psi, G, F)\n    K = K + 0"))
     gain = cell(notebook, "def gain")
     gain.cell_type = kind
-    return notebook | {"cells": [one for one in notebook.cells if kind or one is not gain]}
+    return notebook | {"cells": [each for each in notebook.cells if kind or each is not gain]}
 
 
 def copies():
@@ -323,8 +323,8 @@ def test_what_the_command_says(graded):
 
 def test_what_was_stopped_is_told_the_student_and_leaves_nothing(graded):
     grades = read_lines(graded.folder.parent / "returned-grades.jsonl").values()
-    (found,) = [grade for grade in grades if grade.name == "loops.ipynb"]
-    assert found.comments["b2"].says == f"not run. {found.note}"
+    (looped,) = [grade for grade in grades if grade.name == "loops.ipynb"]
+    assert looped.comments["b2"].says == f"not run. {looped.note}"
     assert ended(int((graded.folder.parent / "pid").read_text()))
 
 
@@ -351,17 +351,17 @@ def graded_here(tmp_path):
 @pytest.mark.parametrize("name", IN_PROCESS)
 def test_only_what_a_student_wrote_counts(graded_here, name):
     notebook, marks, note = IN_PROCESS[name]
-    found = graded_here(notebook())
-    assert (found.status, found.variant) == ("graded", "53")
-    assert (found.marks["b1"], found.marks["b2"]) == marks
-    assert re.search(note, found.note), found.note
+    grade = graded_here(notebook())
+    assert (grade.status, grade.variant) == ("graded", "53")
+    assert (grade.marks["b1"], grade.marks["b2"]) == marks
+    assert re.search(note, grade.note), grade.note
 
 
 def test_what_the_student_reads(graded_here):
     """A step on the student's own wrong one, right parts, an error in a cell before it, a cell that is
     gone."""
 
-    def said(name):
+    def comments(name):
         return graded_here(IN_PROCESS[name][0]()).comments
 
     follows = graded_here(solved(NOT_DIVIDED))
@@ -371,8 +371,8 @@ def test_what_the_student_reads(graded_here):
     assert "right on top of your b1" in comment.says
     half = graded_here(solved(("def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi")))
     assert (half.marks["b2"], half.comments["b2"].share) == ("wrong", 0.5)
-    assert said("is no Python")["b1"].says == f"not run. {DEFINED}"
-    gone = said("a cell is gone")
+    assert comments("is no Python")["b1"].says == f"not run. {DEFINED}"
+    gone = comments("a cell is gone")
     assert gone["b1"].says == "its cell is gone from the notebook"
     assert gone["b2"].says.endswith("or stands on what is not there: the cell of b1")
 
@@ -386,12 +386,12 @@ def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here, monke
 
     check = marking.check
     monkeypatch.setattr(marking, "check", fails)
-    found = graded_here(solved())
-    assert (found.marks["b1"], found.marks["b2"]) == ("not graded", "passed")
-    assert (found.status, found.digest) == ("graded in part", "")
-    assert found.comments["b1"].says == marking.LOOKED_AT
-    told = "look: b1 not graded: the check itself fails, please tell us: AttributeError: of ours"
-    assert found.note == told
+    grade = graded_here(solved())
+    assert (grade.marks["b1"], grade.marks["b2"]) == ("not graded", "passed")
+    assert (grade.status, grade.digest) == ("graded in part", "")
+    assert grade.comments["b1"].says == marking.LOOKED_AT
+    note = "look: b1 not graded: the check itself fails, please tell us: AttributeError: of ours"
+    assert grade.note == note
 
 
 MINE = {"name": "mine", "state": "q*x + v", "meter": "x + w", "parameters": {"q": 0.5}}
@@ -402,11 +402,11 @@ EASY = {"name": "53", "state": "v", "meter": "x + w", "parameters": {}}
 def test_a_variant_of_the_courses_own(graded_here):
     """Its table is in the teacher's file; the same in a notebook counts for nothing."""
     notebook = solution(render(TINY, exercise("b", MINE)))
-    found = graded_here(notebook, variants_file=MY_TOML)
-    assert (found.marks["b1"], found.variant, found.note) == ("passed", "mine", "")
-    found = graded_here(notebook)
-    assert (found.status, found.marks) == ("not graded", {})
-    assert found.note.startswith(
+    grade = graded_here(notebook, variants_file=MY_TOML)
+    assert (grade.marks["b1"], grade.variant, grade.note) == ("passed", "mine", "")
+    grade = graded_here(notebook)
+    assert (grade.status, grade.marks) == ("not graded", {})
+    assert grade.note.startswith(
         "if variant mine is of a file of yours, name that with --variants; no variant 'mine'; "
     )
 
@@ -414,9 +414,9 @@ def test_a_variant_of_the_courses_own(graded_here):
 def test_a_table_of_its_own_gets_nothing(graded_here):
     """Set a solved for an easy table that the opening cell brings along under the name of the
     variant given."""
-    found = graded_here(solution(render(read("a"), exercise("a", EASY))), "53", masters=None)
-    assert "passed" not in found.marks.values()
-    assert "marked as variant 53, which was given, and opens one of its own" in found.note
+    grade = graded_here(solution(render(read("a"), exercise("a", EASY))), "53", masters=None)
+    assert "passed" not in grade.marks.values()
+    assert "marked as variant 53, which was given, and opens one of its own" in grade.note
 
 
 # -- without running
@@ -540,9 +540,9 @@ def test_what_is_not_read_is_named(tmp_path):
     works = {work.name: work for work in submissions.returned(folder, masters=FIXTURES)}
     assert set(works) == {*UNREAD, "B/b.ipynb"}
     for name, work in works.items():
-        found = marking.grade(work, SETTING, start=InsideKernel)
+        grade = marking.grade(work, SETTING, start=InsideKernel)
         assert work.problem.startswith(UNREAD.get(name, ""))
-        assert bool(found.marks) == bool(found.digest) == (name not in UNREAD) != bool(found.note)
+        assert bool(grade.marks) == bool(grade.digest) == (name not in UNREAD) != bool(grade.note)
 
 
 def test_what_cannot_be_graded_at_all_is_an_error(three):
@@ -570,22 +570,24 @@ def test_whose_variant_it_is_tells_the_path_or_the_notebook(three):
     ):
         write(three / f"{name}.ipynb", claims(student=whom))
     listed = [Student("Иванов Иван", "1", "7"), Student("Петрова Анна", "1", "20")]
-    found, other = (
+    returned_, other = (
         {work.name: work for work in submissions.returned(three, given=course._given(students))}
         for students in (listed, None)
     )
-    given = {name: work.variant for name, work in found.items() if work.variant}
+    given = {name: work.variant for name, work in returned_.items() if work.variant}
     assert given == {"a.ipynb": "7", "1/Петрова Анна/x.ipynb": "20"}
     # with another variant it is graded anew
-    assert {name for name in found if found[name].digest != other[name].digest} == set(given)
+    assert {name for name in returned_ if returned_[name].digest != other[name].digest} == set(
+        given
+    )
 
 
 def test_a_kernel_that_does_not_start_is_a_row(three):
     def fails(*_, **__):
         raise RuntimeError("Kernel didn't respond in 60 seconds")
 
-    found = marking.grade(submissions.returned(three, masters=FIXTURES)[0], SETTING, start=fails)
-    assert found == Grade("a.ipynb", "not graded", notes=("Kernel didn't respond in 60 seconds",))
+    grade = marking.grade(submissions.returned(three, masters=FIXTURES)[0], SETTING, start=fails)
+    assert grade == Grade("a.ipynb", "not graded", notes=("Kernel didn't respond in 60 seconds",))
 
 
 def test_the_same_answers_in_another_order_are_the_same_work():
@@ -650,8 +652,8 @@ def test_strange_claims_are_explained(claim):
 def test_the_variant_is_the_one_that_was_given(name, given, source, expected):
     """Never the notebook's: not its name, and no table that it brings along."""
     claim = {"set": "b", "variant": name}
-    found, notes = claimed(claim, [Cell(1, "", "", source)], None, given)
-    assert (found.variant, notes) == (exercise("b", "53").variant, expected)
+    opened, notes = claimed(claim, [Cell(1, "", "", source)], None, given)
+    assert (opened.variant, notes) == (exercise("b", "53").variant, expected)
 
 
 # -- what is run, in which order

@@ -27,11 +27,11 @@ SIGN = next(
     for mistake in question.mistakes
     if (question.name, mistake.name) == ("b2", "innovation-sign")
 )
-EVERYTHING = {one.name: PASSED for one in sets()["b"].questions}
+EVERYTHING = {question.name: PASSED for question in sets()["b"].questions}
 
 
 def graded(name, letter="b", variant="53", passed=(), student="", work="w", looks=(), **wrong):
-    marks = {one.name: NOT_RUN for one in sets()[letter].questions}
+    marks = {question.name: NOT_RUN for question in sets()[letter].questions}
     marks |= dict.fromkeys(passed, PASSED) | dict.fromkeys(wrong, WRONG)
     comments = dict.fromkeys(passed, Comment("right")) | wrong
     return Grade(name, "graded", letter, variant, marks, (), looks, name, comments, student, work)
@@ -95,23 +95,25 @@ def test_what_to_look_at():
 def test_without_a_list_a_folder_is_a_student():
     grades = [graded("РТ-1/A/b.ipynb"), graded("РТ-1/A/c.ipynb", "c"), graded("B.ipynb")]
     persons, strangers = people([*grades, Grade("n.ipynb", "not an exercise notebook")])
-    found = [(one.student[:2], sorted(one.grades), one.flags) for one in persons]
-    assert found == [(("B", ""), ["b"], ["missing: c"]), (("A", "РТ-1"), ["b", "c"], [])]
+    rows = [(person.student[:2], sorted(person.grades), person.flags) for person in persons]
+    assert rows == [(("B", ""), ["b"], ["missing: c"]), (("A", "РТ-1"), ["b", "c"], [])]
     assert strangers == []
 
 
 @pytest.mark.quick
 def test_points_are_the_weights_of_the_levels():
-    assert possible("b") == sum(WEIGHTS[one.level] for one in sets()["b"].questions)
+    assert possible("b") == sum(WEIGHTS[question.level] for question in sets()["b"].questions)
     for parts in (
         (possible(letter) for letter in "abc"),
-        (possible("abc", one) for one in WEIGHTS),
+        (possible("abc", question) for question in WEIGHTS),
     ):
         assert possible("abc") == sum(parts)
     assert points([Grade("x", "graded", "b", marks=EVERYTHING)], USUAL) == possible("b")
-    some = Grade("x", "graded", "b", marks=EVERYTHING | {"b1": WRONG, "b2": UNUSABLE})
-    assert points([some], USUAL) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
-    assert {one.level for set_ in sets().values() for one in set_.questions} <= set(WEIGHTS)
+    grade = Grade("x", "graded", "b", marks=EVERYTHING | {"b1": WRONG, "b2": UNUSABLE})
+    assert points([grade], USUAL) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
+    assert {question.level for set_ in sets().values() for question in set_.questions} <= set(
+        WEIGHTS
+    )
 
 
 @pytest.mark.quick
@@ -193,4 +195,4 @@ def test_an_assignment_comes_back_as_it_was(tmp_path):
     with pytest.raises(ValueError, match="line 3: B has no variant"):
         read_assignment(path, ["1"])
     path.write_text("name,group\nA,1\n", encoding="utf-8")
-    assert [one.variant for one in read_assignment(path, ["7"])] == ["7"]
+    assert [student.variant for student in read_assignment(path, ["7"])] == ["7"]

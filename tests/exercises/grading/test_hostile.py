@@ -190,9 +190,9 @@ def test_a_sandbox_holds(staged, box, tmp_path, monkeypatch):
         with kernel_in(holds, staged) as kernel:
             marking.run(kernel, [OPEN, *steps, RIGHT, CHECK])
     assert marking.notes == [] and marking.marks["b1"] == "passed"
-    told = " ".join(marking.errors)
-    assert "AssertionError" not in told, told
-    assert "imported: ModuleNotFoundError" in told
+    errors = " ".join(marking.errors)
+    assert "AssertionError" not in errors, errors
+    assert "imported: ModuleNotFoundError" in errors
     assert not (outside / "written").exists() and not flag.exists()
 
 

@@ -37,9 +37,9 @@ def sent(value):
     ],
 )
 def test_values_and_formulas(value):
-    found = sent(value)
-    assert (found, type(found)) == (value, type(value))
-    assert sp.srepr(found) == sp.srepr(value)
+    received = sent(value)
+    assert (received, type(received)) == (value, type(value))
+    assert sp.srepr(received) == sp.srepr(value)
 
 
 @pytest.mark.parametrize("kind", ["?", "i1", "<u2", ">i8", "f2", "f4", "f8", "c8", "c16"])
@@ -49,17 +49,17 @@ def test_arrays(kind, shape):
     if shape == ():
         assert type(sent(array[()])) is type(array[()])
     for value in (array, array[::-1] if shape else array):
-        found = sent(value)
-        assert found.shape == shape and found.dtype == array.dtype.newbyteorder("=")
-        np.testing.assert_array_equal(found, value)
-        assert found.flags.writeable
+        received = sent(value)
+        assert received.shape == shape and received.dtype == array.dtype.newbyteorder("=")
+        np.testing.assert_array_equal(received, value)
+        assert received.flags.writeable
 
 
 @pytest.mark.parametrize("value", [{1: 2}, {1}, len, object()])
 def test_anything_else_is_its_type_only(value):
-    found = sent(value)
-    assert isinstance(found, Other)
-    assert type(found).__name__ == type(value).__name__
+    received = sent(value)
+    assert isinstance(received, Other)
+    assert type(received).__name__ == type(value).__name__
 
 
 def test_functions_are_called_on_the_other_side():
@@ -118,8 +118,8 @@ def test_every_question_can_be_asked_with_numbers_of_the_graders_own(letter):
             for values in question.arguments(task):
                 functions = [value for value in values if callable(value)]
                 data.append(json.dumps(encode(tuple(values), functions.index)))
-                found = decode(json.loads(data[-1]), functions.__getitem__)
-                assert [type(a) for a in found] == [type(b) for b in values], question.name
+                received = decode(json.loads(data[-1]), functions.__getitem__)
+                assert [type(a) for a in received] == [type(b) for b in values], question.name
             texts.append(" ".join(data))
         numbers = "array" in texts[0] or "." in texts[0]
         assert texts[0] != texts[1] or "function" in texts[0] or not numbers, question.name

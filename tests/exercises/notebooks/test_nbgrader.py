@@ -15,7 +15,7 @@ def test_every_question_is_a_test_worth_its_points(letter):
     notebook = source_notebook(rendered(letter))
     nbformat.validate(notebook)
     marked = [
-        (one, one.metadata["nbgrader"]) for one in notebook.cells if "nbgrader" in one.metadata
+        (each, each.metadata["nbgrader"]) for each in notebook.cells if "nbgrader" in each.metadata
     ]
     marks = {mark["grade_id"]: mark for _, mark in marked}
     assert len(marks) == len(marked)
@@ -23,27 +23,31 @@ def test_every_question_is_a_test_worth_its_points(letter):
     tests = {name: mark for name, mark in marks.items() if mark["grade"]}
     assert all(mark["locked"] and not mark["solution"] for mark in tests.values())
     worth = {name: mark["points"] for name, mark in tests.items()}
-    assert worth == {one.name: WEIGHTS[one.level] for one in sets()[letter].questions}
+    assert worth == {
+        question.name: WEIGHTS[question.level] for question in sets()[letter].questions
+    }
     assert sum(worth.values()) == possible(letter)
     # nbgrader refuses a solution outside of a solution cell, and a solution cell in Markdown that
     # is worth nothing
-    solutions = [one for one in notebook.cells if "SOLUTION" in one.source]
-    assert solutions == [one for one, mark in marked if mark["solution"]]
-    assert {one.cell_type for one in solutions} == {"code"}
+    solutions = [each for each in notebook.cells if "SOLUTION" in each.source]
+    assert solutions == [each for each, mark in marked if mark["solution"]]
+    assert {each.cell_type for each in solutions} == {"code"}
 
 
 def test_a_test_fails_with_what_the_check_says():
     notebook = source_notebook(rendered("e"))
     dear = ("compare(", "relative_accuracy(")
-    notebook.cells = [one for one in notebook.cells if not any(name in one.source for name in dear)]
+    notebook.cells = [
+        each for each in notebook.cells if not any(name in each.source for name in dear)
+    ]
 
-    def told():
+    def failures():
         failed = errors(execute_inside(notebook))
-        tests = [error for one, error in failed if one.metadata.get("nbgrader", {}).get("grade")]
+        tests = [error for each, error in failed if each.metadata.get("nbgrader", {}).get("grade")]
         return [error.evalue for error in tests]
 
-    assert told() == []
+    assert failures() == []
     next(
-        one for one in notebook.cells if "def error_variance" in one.source
+        each for each in notebook.cells if "def error_variance" in each.source
     ).source += "\nerror_variance = lambda x, z: x"
-    assert [text.partition(": ")[0] for text in told()] == ["✗ e1 the error variance"]
+    assert [text.partition(": ")[0] for text in failures()] == ["✗ e1 the error variance"]

@@ -215,7 +215,7 @@ def test_mathml_leaves_code_alone():
 )
 def test_a_failing_cell_is_named(monkeypatch, source, message):
     monkeypatch.setattr(execution, "SECONDS", 5)
-    cells = [nbformat.v4.new_code_cell(one) for one in ("1", source, "2")]
+    cells = [nbformat.v4.new_code_cell(text) for text in ("1", source, "2")]
     with pytest.raises(NotebookFailed, match=f"here, cell {cells[1].id}: {message}"):
         execution.execute(nbformat.v4.new_notebook(cells=cells), "here")
 
@@ -228,31 +228,31 @@ def job(tmp_path, masters, kind="solutions"):
 
 
 def test_what_is_up_to_date_is_not_made_again(tmp_path, masters, no_kernel, monkeypatch):
-    one = job(tmp_path, masters)
-    assert make(one).status == "written"
-    before = contents(one.folder)
+    made = job(tmp_path, masters)
+    assert make(made).status == "written"
+    before = contents(made.folder)
     assert sorted(before) == ["b-aof-solution.html", "b-aof-solution.ipynb"]
-    assert make(one).status == "up to date"
-    assert contents(one.folder) == before and len(no_kernel) == 1
+    assert make(made).status == "up to date"
+    assert contents(made.folder) == before and len(no_kernel) == 1
 
     text = TINY.replace("Divide.", "Divide by F.")
     (masters / "b_aof" / "statement.md").write_text(text, encoding="utf-8")
-    assert make(one).status == "written"
-    assert "Divide by F." in one.target.read_text(encoding="utf-8")
-    assert make(one).status == "up to date"
-    one.target.with_suffix(".html").unlink()
-    assert make(one).status == "written"
+    assert make(made).status == "written"
+    assert "Divide by F." in made.target.read_text(encoding="utf-8")
+    assert make(made).status == "up to date"
+    made.target.with_suffix(".html").unlink()
+    assert make(made).status == "written"
     monkeypatch.setattr(jobs, "package_digest", lambda: "another version")
-    assert make(one).status == "written"
+    assert make(made).status == "written"
     assert len(no_kernel) == 4
 
 
 def test_exercises_have_pictures_and_no_solutions(tmp_path, masters, no_kernel):
-    one = job(tmp_path, masters, "exercises")
-    assert make(one) == Outcome(one, "written")
-    assert list(contents(one.folder)) == ["b-aof.ipynb"]
-    notebook = nbformat.read(one.target, as_version=4)
-    assert "linalg.solve" not in one.target.read_text(encoding="utf-8")
+    made = job(tmp_path, masters, "exercises")
+    assert make(made) == Outcome(made, "written")
+    assert list(contents(made.folder)) == ["b-aof.ipynb"]
+    notebook = nbformat.read(made.target, as_version=4)
+    assert "linalg.solve" not in made.target.read_text(encoding="utf-8")
     assert sum(bool(cell.get("attachments")) for cell in notebook.cells) == 1
     assert not any(cell.outputs or cell.execution_count for cell in code(notebook))
 
@@ -415,12 +415,14 @@ def test_assignment_does_not_move_and_gives_a_group_all_variants(tmp_path):
     for count in (1, 7, 29, 40):
         assert students(tmp_path, count) == whole[:count]
     for group in ("G0", "G1"):
-        given = [one.variant for one in whole if one.group == group]
+        given = [student.variant for student in whole if student.group == group]
         for start in range(0, 20, len(VARIANTS)):
             assert sorted(given[start : start + len(VARIANTS)]) == sorted(VARIANTS)
     # else the first in every group would have the same
     rows = "".join(f"A,{i}\n" for i in range(30))
-    assert {one.variant for one in assigned(tmp_path, "name,group\n" + rows)} == set(VARIANTS)
+    assert {student.variant for student in assigned(tmp_path, "name,group\n" + rows)} == set(
+        VARIANTS
+    )
 
 
 @pytest.mark.parametrize("separator", [",", ";"])
@@ -428,8 +430,8 @@ def test_assignment_does_not_move_and_gives_a_group_all_variants(tmp_path):
 def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
     rows = (" Group ", "No", "NAME"), ("М-1", "1", '"Иванов, Иван"'), ()
     text = "".join(separator.join(row) + "\r\n" for row in rows)
-    (one,) = assigned(tmp_path, text, encoding)
-    assert (one.name, one.group) == ("Иванов, Иван", "М-1")
+    (student,) = assigned(tmp_path, text, encoding)
+    assert (student.name, student.group) == ("Иванов, Иван", "М-1")
 
 
 @pytest.mark.quick

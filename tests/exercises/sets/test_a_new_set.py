@@ -55,10 +55,14 @@ def package(tmp_path, monkeypatch):
 
 
 def test_a_new_folder_is_a_new_set(package, monkeypatch):
-    (found,) = discover(package.name, package)
-    assert (found.letter, found.name, found.folder) == ("y", "y-doubling", package / "y_doubling")
+    (discovered,) = discover(package.name, package)
+    assert (discovered.letter, discovered.name, discovered.folder) == (
+        "y",
+        "y-doubling",
+        package / "y_doubling",
+    )
     monkeypatch.setattr(registry, "_registered", dict(sets()))
-    registry.register(found)
+    registry.register(discovered)
     task = exercise("y", "53")
     assert task.check("y1", lambda x: x + x).passed
     assert task.check("y1", lambda x: x).diagnosis == ("once",)
@@ -74,6 +78,6 @@ def test_a_letter_is_taken_once():
 
 def test_every_folder_is_a_set():
     folder = sets()["a"].folder.parent
-    assert sorted(one.folder for one in sets().values()) == sorted(
+    assert sorted(set_.folder for set_ in sets().values()) == sorted(
         path.parent for path in folder.glob("*/statement.md")
     )

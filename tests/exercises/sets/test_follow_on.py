@@ -17,10 +17,10 @@ FOLLOWING = [
         id=(name := f"{question.name}-{earlier.name}"),
         marks=[pytest.mark.slow] if name in DEAR else [],
     )
-    for letter, one in sets().items()
-    for question in one.questions
+    for letter, set_ in sets().items()
+    for question in set_.questions
     if (step := question.key.step if isinstance(question.key, ForVariant) else question.key)
-    for earlier in one.questions
+    for earlier in set_.questions
     if earlier.name < question.name
     and earlier.function in uses(step)
     and not isinstance(question, Derivation)

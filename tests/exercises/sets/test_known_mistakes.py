@@ -20,7 +20,7 @@ MODELS = ("53", "7", "9", "12", "20", "21")
 DRAWS = ("53", "21")
 # Each question in one of its variants, in another one every week; in all of them every night.
 HIDDEN = {"f": DRAWS, "g": ("53", "12", "20", "21")} | {
-    letter: DRAWS for letter, one in sets().items() if not one.about_variant
+    letter: DRAWS for letter, set_ in sets().items() if not set_.about_variant
 }
 
 CASES = [
@@ -31,8 +31,8 @@ CASES = [
         id=f"{question.name}-{variant}",
         marks=[] if place == chosen else pytest.mark.slow,
     )
-    for letter, one in sets().items()
-    for number, question in enumerate(one.questions)
+    for letter, set_ in sets().items()
+    for number, question in enumerate(set_.questions)
     for variants in [HIDDEN.get(letter, MODELS)]
     for chosen in [(WEEK + number) % len(variants)]
     for place, variant in enumerate(variants)
@@ -48,8 +48,8 @@ def test_every_edit_finds_its_text():
     """In exactly one place of the key, or of a function that it calls; ValueError otherwise."""
     edits = [
         m.wrong
-        for one in sets().values()
-        for q in one.questions
+        for set_ in sets().values()
+        for q in set_.questions
         for m in q.mistakes
         if isinstance(m.wrong, partial)
     ]
@@ -93,7 +93,7 @@ def test_every_answer_and_every_mistake(letter, question, variant):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "letter", [letter for letter, one in sets().items() if one.about_variant and letter != "a"]
+    "letter", [letter for letter, set_ in sets().items() if set_.about_variant and letter != "a"]
 )
 def test_hidden_arguments_tell_every_mistake_apart_in_every_variant(letter):
     """No known mistake gives the right numbers for any variant of the lab; a transposed number is
@@ -130,8 +130,8 @@ def equal_in_fact(wrong, arguments, right):
             theirs = [wrong(*values) for values in arguments]
         pairs = [
             pair
-            for found, expected in zip(theirs, right, strict=True)
-            for pair in paired(found, expected)
+            for result, expected in zip(theirs, right, strict=True)
+            for pair in paired(result, expected)
         ]
     except Exception:  # a mistake that this variant does not allow
         return None
@@ -143,9 +143,9 @@ def equal_in_fact(wrong, arguments, right):
         return all(np.allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max()) for a, b in pairs)
 
 
-def paired(found, expected):
+def paired(result, expected):
     """The parts of two results as arrays."""
-    return list(zip(numbers(found), numbers(expected), strict=True))
+    return list(zip(numbers(result), numbers(expected), strict=True))
 
 
 def numbers(result):

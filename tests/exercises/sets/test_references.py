@@ -61,25 +61,25 @@ def test_the_extended_filter_is_the_package_s(name):
     mean, cov = model.prior.mean + 0.3 * np.sqrt(np.diagonal(model.prior.cov)), model.prior.cov
     shifted = replace(model, prior=Gaussian(mean, cov))
     z, p, lam, Psi = extended.run_filter(y, mean, cov, *functions)
-    one = aof(linearised(shifted))
-    law, before = run(one, y), predictions(one, y)
+    ekf = aof(linearised(shifted))
+    law, before = run(ekf, y), predictions(ekf, y)
     for mine, theirs in ((z, law.mean), (p, law.cov), (lam, before.mean), (Psi, before.cov)):
         np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
-    found = extended.consistency(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
-    np.testing.assert_allclose(found[0], nees(x, law).mean(axis=1), rtol=1e-6)
+    theirs = extended.consistency(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
+    np.testing.assert_allclose(theirs[0], nees(x, law).mean(axis=1), rtol=1e-6)
     np.testing.assert_allclose(
-        found[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6
+        theirs[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6
     )
 
 
 def test_hidden_jacobians_are_derivatives():
     for n, r, p in ((3, 3, 2), (1, 1, 1), (2, 1, 2)):
-        one = hidden_functions(exercise("g", "53"), "test", n, r, p)
+        hidden = hidden_functions(exercise("g", "53"), "test", n, r, p)
         x = np.random.default_rng(1).normal(size=(4, n))
-        for function, jacobian in ((one.f, one.Phi), (one.S, one.H)):
+        for function, jacobian in ((hidden.f, hidden.Phi), (hidden.S, hidden.H)):
             # third derivatives of order one: error of the order step^2
             np.testing.assert_allclose(extended.jacobian(function, x, 1e-4), jacobian(x), atol=1e-7)
-        assert np.linalg.eigvalsh(one.D_n(x)).min() > 0
+        assert np.linalg.eigvalsh(hidden.D_n(x)).min() > 0
 
 
 def riccati(t, D, a, s, h, S_xi, N):
@@ -114,12 +114,12 @@ def test_two_steps_of_modes_are_the_package_s_filter(variant):
             )
             for c in C
         ]
-        one = logic_dynamic([gaussian(model) for model in models], pi, first)
-        before = one.step(one.init(1), y[:1, None])
-        after = one.step(before, y[1:, None])
-        found = modes.two_steps(y, m, d, a, q, C, pi, first)
+        filter_ = logic_dynamic([gaussian(model) for model in models], pi, first)
+        before = filter_.step(filter_.init(1), y[:1, None])
+        after = filter_.step(before, y[1:, None])
+        theirs = modes.two_steps(y, m, d, a, q, C, pi, first)
         np.testing.assert_allclose(
-            found, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12
+            theirs, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12
         )
 
 

@@ -98,8 +98,8 @@ def h4_solved(a, s, h, S_xi, N):
 def i3_solved(y0, y1, y2, dt):
     r, v, a = sp.symbols("r v a")
     equations = [r - v * k * dt + a * (k * dt) ** 2 / 2 - y for k, y in ((0, y2), (1, y1), (2, y0))]
-    found = sp.solve(equations, [r, v, a])
-    return found[r], found[v], found[a]
+    solved = sp.solve(equations, [r, v, a])
+    return solved[r], solved[v], solved[a]
 
 
 def j1_by_rotations(r, phi, eps):
@@ -111,8 +111,8 @@ def j1_by_rotations(r, phi, eps):
 def j5_solved(a, T, alpha, beta):
     e, d = sp.symbols("e d")
     before = e + T * d + a * T**2 / 2
-    found = sp.solve([before * (1 - alpha) - e, d + a * T - beta / T * before - d], [e, d])
-    return found[e], found[d]
+    solved = sp.solve([before * (1 - alpha) - e, d + a * T - beta / T * before - d], [e, d])
+    return solved[e], solved[d]
 
 
 def j6_closed(alpha, beta):

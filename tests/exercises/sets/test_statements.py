@@ -31,22 +31,22 @@ def test_what_students_get(letter, variant):
     only with "not implemented"."""
     whole, questions = rendered(letter, variant), sets()[letter].questions
     handed_out = student(whole, {})
-    solved = {one.id: one.source for one in solution(whole).cells}
+    solved = {each.id: each.source for each in solution(whole).cells}
     stubs = {}
-    for one in handed_out.cells:
-        assert not ANSWERS.search(one.source) and "SOLUTION" not in one.source
-        lines = iter(solved[one.id].splitlines())
-        own = [line for line in one.source.splitlines() if line.strip() not in STUBS]
+    for each in handed_out.cells:
+        assert not ANSWERS.search(each.source) and "SOLUTION" not in each.source
+        lines = iter(solved[each.id].splitlines())
+        own = [line for line in each.source.splitlines() if line.strip() not in STUBS]
         assert all(line in lines for line in own)  # in this order
-        if STUB in one.source:
-            (function,) = ast.parse(one.source).body[:1]
+        if STUB in each.source:
+            (function,) = ast.parse(each.source).body[:1]
             stubs[function.name] = [argument.arg for argument in function.args.args]
     for question in questions:
         key = question.answer(opened(letter, variant))
         assert stubs[question.function] == list(inspect.signature(key).parameters)
     assert len(stubs) == len(questions) + (letter == "e")  # question 6 of set e has one, too
     assert statuses(handed_out) == dict.fromkeys([q.name for q in questions], "not implemented")
-    tags = [tag for one in whole.cells for tag in one.metadata.get("tags", [])]
+    tags = [tag for each in whole.cells for tag in each.metadata.get("tags", [])]
     assert tags.count("check") == len(questions) and "picture" in tags
 
 
@@ -55,8 +55,8 @@ def test_worked_solutions_pass(letter, variant):
     """They run to the end, the answers in words too, which hold for the variant at hand."""
     worked = solution(rendered(letter, variant))
     done = execute_inside(worked)
-    assert errors(done) == [] and {one["status"] for one in results(done)} == {"passed"}
-    assert any(ANSWERS.search(one.source) for one in worked.cells) == (letter != "s")
+    assert errors(done) == [] and {each["status"] for each in results(done)} == {"passed"}
+    assert any(ANSWERS.search(each.source) for each in worked.cells) == (letter != "s")
 
 
 @pytest.mark.quick
@@ -80,6 +80,6 @@ def test_every_question_has_a_task_and_a_hint(letter):
 
 @pytest.mark.parametrize(("variant", "first"), [("53", 1), ("5", 0), ("20", 0), ("12", 0)])
 def test_the_first_step_is_left_out_only_where_the_meter_is_silent(variant, first):
-    text = "\n".join(one.source for one in rendered("g", variant).cells)
+    text = "\n".join(each.source for each in rendered("g", variant).cells)
     assert ("The first step is left out" in text) == bool(first) == ("[1:] for" in text)
     assert f"np.arange({first}, len(y))" in text
