@@ -8,9 +8,9 @@ import pytest
 from inside import InsideKernel, statuses
 
 from kfcourse.exercises.checks import sets
-from kfcourse.notebooks.grading import marking, submissions
-from kfcourse.notebooks.grading.running import Site
-from kfcourse.notebooks.grading.sandbox import Sandbox
+from kfcourse.exercises.grading import marking, submissions
+from kfcourse.exercises.grading.running import Site
+from kfcourse.exercises.grading.sandbox import Sandbox
 
 FOLDER = Path(__file__).parent / "handed_out"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))

@@ -71,11 +71,11 @@ def test_every_question_has_a_task_and_a_hint(letter):
         hint = r"(?s)<details><summary>Hint</summary>\n\n(.+?)\n\n</details>"
         assert re.search(hint, body), f"{name} has no hint"
     assert "**To hand in**" in read(letter)
-    imported = set(re.findall(r"kfcourse\.exercises\.\w+\.(\w+)", read(letter)))
+    imported = set(re.findall(r"kfcourse\.exercises\.sets\.\w+\.(\w+)", read(letter)))
     assert imported <= {"companion"}, "a module of a key"
     for name in imported:
         source = (sets()[letter].folder / f"{name}.py").read_text(encoding="utf-8")
-        assert not re.search(r"kfcourse\.exercises\.\w+\.", source)
+        assert not re.search(r"kfcourse\.exercises\.sets\.", source)
 
 
 @pytest.mark.parametrize(("variant", "first"), [("53", 1), ("5", 0), ("20", 0), ("12", 0)])
