@@ -12,6 +12,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -48,7 +49,7 @@ from kfcourse.lab.variants import RUNS as CHECKED
 from kfcourse.lab.variants import STEPS, find_variant, read_tables, read_variants, summary
 from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.experiment import without_failing
+from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.parallel import cores
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -252,11 +253,11 @@ def lab(
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = without_failing(
-        filters, model, runs, steps or chosen.steps, seed,
-        left_out=refused, same_ensemble=same_ensemble, jobs=jobs, dask=dask,
-        scores=judging(model) if scores else None,
+    result = compare(
+        filters, model, runs, steps or chosen.steps, seed, same_ensemble=same_ensemble, jobs=jobs,
+        dask=dask, scores=judging(model) if scores else None,
     )  # fmt: skip
+    result = replace(result, left_out={**refused, **result.left_out})
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
     to_error = str(json_file) in STANDARD_OUTPUT

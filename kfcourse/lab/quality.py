@@ -25,7 +25,7 @@ import joblib
 import numpy as np
 from tqdm import tqdm
 
-from kfcourse.errors import NoClosedForm, NotFinite
+from kfcourse.errors import NoClosedForm, NotFinite, Reason
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import LAB, Structures, operations, title
 from kfcourse.lab.variants import RUNS, Variant
@@ -154,8 +154,11 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
         return {"bounded": moments}
     try:
         result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
-    except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
-        return {"bounded": Finding(False, str(error), moments.value)}
+        failures: list[Reason] = [*result.left_out.values()]
+    except NotFinite as error:
+        failures = [error]
+    if failures:
+        return {"bounded": Finding(False, str(failures[0]), moments.value)}
     return {
         "bounded": not_diverging(result, x) or moments,
         "observable": observable(result, x),

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from kfcourse.errors import NotFinite, expect
+from kfcourse.errors import NotFinite, Refused, expect
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design
 from kfcourse.laws import NegativeVariance
@@ -20,9 +20,11 @@ from kfcourse.montecarlo.ensemble import Instant
 
 
 def failed(name: str, step: int, error: Exception) -> NotFinite:
-    """What a filter's linear algebra raised at a step, as the reason for which it is left out."""
+    """What a filter raised at a step, as the reason for which it is left out."""
     kind = "negative" if isinstance(error, NegativeVariance) else ""
-    return NotFinite(f"step {step}: {name} failed: {error}", name, kind, step=step)
+    names_itself = isinstance(error, Refused)
+    words = str(error) if names_itself else f"step {step}: {name} failed: {error}"
+    return NotFinite(words, name, kind, step=step)
 
 
 def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1) -> list[Filter]:

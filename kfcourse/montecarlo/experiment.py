@@ -10,9 +10,10 @@ trajectories, and keeps sums over batches of these, never the trajectories thems
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from itertools import accumulate, islice
 from typing import Any, NamedTuple, TypeVar
 
@@ -46,6 +47,7 @@ DESIGN_RUNS = 200_000
 WIDE = 1.5  # times as wide as the prior: a law from which half of the initial states are drawn
 
 T = TypeVar("T")
+F = TypeVar("F", Filter, Filter | Design)
 
 
 def run(filter_: Filter, y: Array) -> Gaussian:
@@ -144,8 +146,8 @@ def compare(
     ----------
     filters : sequence of Filter or Design
         Designs are designed first, on an ensemble of their own; standard errors hold for the
-        filters as they were designed. One that cannot go on (the exact one, particles) is left out,
-        and `Comparison.left_out` tells why.
+        filters as they were designed. One that cannot go on, as it leaves the finite numbers or
+        says so itself, is left out, and `Comparison.left_out` tells why.
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
@@ -178,7 +180,7 @@ def compare(
     ValueError
         Filters of equal name, sizes that are not positive whole numbers.
     NotFinite
-        A trajectory or a filter left the finite numbers.
+        The model's trajectories become infinite, or no filter is left.
     """
     _check_arguments(filters, model)
     if smoothers:
@@ -194,26 +196,22 @@ def compare(
     design_seed, *seeds = np.random.SeedSequence(seed).spawn(1 + min(BATCHES, runs))
     sizes = batch_sizes(runs)
     where = (sizes, seeds) if same_ensemble else ([design_runs], [design_seed])
-    ready = _designed(filters, instants(model, where[0], steps, where[1]), steps, jobs, progress)
+    ensemble = partial(instants, model, where[0], steps, where[1])
     sample = Sample(model, steps, sizes, seeds, None if same_ensemble else width(model))
+    work = {"jobs": jobs, "progress": progress}
+    left_out = dict[str, Reason]()
+    ready = _able(
+        filters, left_out, lambda those: _designed(those, ensemble(), steps, jobs, progress)
+    )
     with cluster(dask):
-        try:
-            result = _compared(ready, sample, seed, jobs, progress, scores=scores)
-        except NotFinite:
-            if sample.wide is None:
-                raise
-            # some far start is too far: none but the prior's own
-            sample = sample._replace(wide=None)
-            result = _compared(ready, sample, seed, jobs, progress, scores=scores)
-        if not same_ensemble:
-            result = replace(
-                result,
-                designed=tuple(filter_.name for filter_ in filters if isinstance(filter_, Design)),
-            )
+        result = _compared(ready, sample, seed, left_out, scores=scores, **work)
         if smoothers:
-            looking_back = _compared(smoothers, sample, seed, jobs, progress, back=True)
+            looking_back = _compared(smoothers, sample, seed, {}, back=True, **work)
             result = replace(result, smoothing=looking_back)
-    return result
+    if same_ensemble:
+        return result
+    designed = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
+    return replace(result, designed=tuple(designed))
 
 
 def width(model: Model | JumpModel) -> float | None:
@@ -227,34 +225,17 @@ def batch_sizes(runs: int) -> list[int]:
     return np.diff(np.linspace(0, runs, min(BATCHES, runs) + 1).astype(int)).tolist()
 
 
-def without_failing(
-    filters: Sequence[Filter | Design],
-    *common: Any,
-    left_out: Mapping[str, Reason] | None = None,
-    **options: Any,
-) -> Comparison:
-    """`compare` of the filters that do not fail; the others are named in `left_out`, beside those
-    given.
-
-    A filter that leaves the finite numbers is taken out, and the comparison starts again.  Other
-    arguments as of `compare`.
-
-    Raises
-    ------
-    NotFinite
-        The model's trajectories become infinite, or no filter is left.
-    """
-    reasons = dict(left_out or {})
+def _able(filters: Sequence[F], left_out: dict[str, Reason], work: Callable[[Sequence[F]], T]) -> T:
+    """What the work makes of the filters that can do it; it begins again without one that cannot,
+    and `left_out` gets the reason."""
     while True:
         try:
-            result = compare(filters, *common, **options)
+            return work(filters)
         except NotFinite as error:
             rest = [filter_ for filter_ in filters if filter_.name != error.filter_name]
-            if not error.filter_name or not [filter_ for filter_ in rest if not filter_.slow]:
+            if not rest or len(rest) == len(filters):
                 raise
-            filters, reasons[error.filter_name] = rest, error.with_traceback(None)
-        else:
-            return replace(result, left_out={**reasons, **result.left_out})
+            filters, left_out[error.filter_name] = rest, error.with_traceback(None)
 
 
 class Sample(NamedTuple):
@@ -302,52 +283,43 @@ def _compared(
     filters: Sequence[Filter],
     sample: Sample,
     seed: int,
+    left_out: dict[str, Reason],
+    **options: Any,
+) -> Comparison:
+    """All filters on the sample that can go on; the others are left out.  Options of `_summed`."""
+
+    def summed(those: Sequence[Filter]) -> tuple[Sequence[Filter], Sums]:
+        try:
+            return those, _summed(those, sample, **options)
+        except NotFinite:
+            if sample.wide is None:
+                raise
+            # some far start is too far: none but the prior's own
+            return those, _summed(those, sample._replace(wide=None), **options)
+
+    able, sums = _able(filters, left_out, summed)
+    names, runs = tuple(filter_.name for filter_ in able), sum(sample.sizes)
+    comparison = Comparison(sample.model, names, runs, sample.steps, seed, sums)
+    return replace(comparison, left_out=left_out, scored=options.get("scores") is not None)
+
+
+def _summed(
+    filters: Sequence[Filter],
+    sample: Sample,
+    *,
     jobs: int,
     progress: bool | None,
-    *,
     back: bool = False,
     scores: Structure | None = None,
-) -> Comparison:
-    """All filters on the sample; one that cannot go on is left out, and the others start again."""
-    running, left_out = list(filters), dict[str, Reason]()
-    while True:
-        # slow filters take much memory for each trajectory, and so does looking back
-        dear = back or any(filter_.slow for filter_ in running)
-        each = 1 if dear else max(1, PIECE // max(sample.sizes))
-        parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
-        work = (
-            joblib.delayed(run_batches)(running, part, back=back, scores=scores) for part in parts
-        )
-        done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
-        try:
-            sums = Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
-        except LeftOut as failure:
-            left_out[failure.filter_name] = failure.reason
-            running = [filter_ for filter_ in running if filter_.name != failure.filter_name]
-            if not running:
-                raise NotFinite(str(failure.reason), failure.filter_name) from None
-        else:
-            names = tuple(filter_.name for filter_ in running)
-            runs = sum(sample.sizes)
-            return Comparison(
-                sample.model,
-                names,
-                runs,
-                sample.steps,
-                seed,
-                sums,
-                left_out=left_out,
-                scored=scores is not None,
-            )
-
-
-class LeftOut(Exception):
-    """A filter that cannot go on, as it is slow or says so itself, and that the others do
-    without."""
-
-    def __init__(self, filter_name: str, reason: Reason):
-        super().__init__(filter_name, reason)
-        self.filter_name, self.reason = filter_name, reason
+) -> Sums:
+    """The sums over all batches, pieces of which are shared out."""
+    # slow filters take much memory for each trajectory, and so does looking back
+    dear = back or any(filter_.slow for filter_ in filters)
+    each = 1 if dear else max(1, PIECE // max(sample.sizes))
+    parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
+    work = (joblib.delayed(run_batches)(filters, part, back=back, scores=scores) for part in parts)
+    done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
+    return Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
 
 
 def run_batches(
@@ -435,9 +407,8 @@ def _named(filter_: Filter, step: int) -> Iterator[None]:
     try:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
-        if filter_.slow or isinstance(error, Refused):
-            raise LeftOut(filter_.name, error.with_traceback(None)) from None
-        if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
+        numbers = Refused | NotFinite | NegativeVariance | np.linalg.LinAlgError
+        if filter_.slow or isinstance(error, numbers):
             raise failed(filter_.name, step, error) from None
         raise
 
@@ -453,14 +424,13 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
             f"its equations and parameters"
         )
     filter_ = filters[int(np.argmin(finite[:, step]))]
-    reason = NotFinite(
+    raise NotFinite(
         f"step {step}: {filter_.name} became infinite or NaN although the trajectories are finite: "
         f"the filter diverges, or its model is another",
         filter_.name,
         "infinite",
         step=step,
     )
-    raise LeftOut(filter_.name, reason) if filter_.slow else reason
 
 
 def _progress(
