@@ -26,7 +26,7 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.errors import NoClosedForm, NotFinite, Reason
-from kfcourse.lab.admission import admissions
+from kfcourse.lab.admission import admissions, aligned
 from kfcourse.lab.short_names import LAB, Structures, operations, title
 from kfcourse.lab.variants import RUNS, Variant
 from kfcourse.laws import Array, Gaussian
@@ -189,14 +189,12 @@ def table(qualities: Sequence[Quality]) -> str:
     """What `kfcourse variants --check` prints: a line for each variant, then what is not well
     posed."""
     rows = [("variant", *CRITERIA, "remarks"), *map(_row, qualities)]
-    form = "  ".join(f"{{:{max(map(len, column))}}}" for column in zip(*rows, strict=True))
     reasons = [
         f"variant {quality.name} is not well posed, {fault}: {why}"
         for quality in qualities
         for fault, why in quality.faults.items()
     ]
-    lines = [form.format(*row).rstrip() for row in rows]
-    return "\n".join([*lines, LEGEND, *([""] if reasons else []), *reasons])
+    return "\n".join([*aligned(rows), LEGEND, *([""] if reasons else []), *reasons])
 
 
 def _row(quality: Quality) -> tuple[str, ...]:

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,6 +27,7 @@ from kfcourse.files import replacing_together, save
 from kfcourse.filters import Design, Filter
 from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
+from kfcourse.lab.families import WORDS
 from kfcourse.lab.report_modes import JumpReport
 from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
@@ -40,7 +39,6 @@ from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 
-WORDS = tomllib.loads((resources.files("kfcourse.lab") / "report.toml").read_text(encoding="utf-8"))
 LANGUAGES = tuple(WORDS)
 RECOGNISED = 1600  # trajectories on which modes are told
 STANDARD_OUTPUT = ("-", "/dev/stdout")
@@ -70,14 +68,12 @@ def write_report(
         "variant": variant,
         "language": language,
     }
-    labels = plots.Words(
-        report.title, **{part: report.words[f"axis_{part}"] for part in plots.Words._fields[1:]}
-    )
+    drawn = {name: partial(plots.FIGURES[name], result) for name in report.figures}
+    if modes:
+        drawn["modes"] = partial(plots.mode_probabilities, modes)
     with replacing_together(folder) as place:
-        for name in report.figures:
-            save_figure(partial(plots.FIGURES[name], result, words=labels), place, name)
-        if modes:
-            save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "modes")
+        for name, draw in drawn.items():
+            save_figure(partial(draw, words=report.words), place, name)
         save_texts(("report.html", "report.tex"), place, content)
         return [folder / path.name for path in place.iterdir()]
 

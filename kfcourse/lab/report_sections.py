@@ -31,9 +31,9 @@ from kfcourse.lab.report_text import (
     ranges,
     written_lines,
 )
-from kfcourse.lab.short_names import Structures, entry
+from kfcourse.lab.short_names import Structures, entry, title
 from kfcourse.laws import CONFIDENCE
-from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
+from kfcourse.montecarlo.comparison import Comparison, Verdict
 from kfcourse.montecarlo.modes import Recognised
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
@@ -492,8 +492,7 @@ class StudentReport:
         )
 
     def title(self, name: str) -> str:
-        field_ = self.words["field_of_title"]
-        return self.words["exact_title"] if name == EXACT else str(getattr(entry(name), field_))
+        return title(name, self.words)
 
 
 def _value(mode: Model, name: sp.Symbol) -> str:

@@ -254,13 +254,13 @@ class Comparison:
         )
         return [[self.entrants[i] for i in column] for column in order.T]
 
-    def leaders(self, step: int, confidence: float = CONFIDENCE) -> list[str]:
+    def leaders(self, step: int) -> list[str]:
         """The most accurate entrant at a step, then those that are not significantly worse, each by
         its own paired interval."""
         best, *others = self._ranked[step]
         return [
             best,
-            *(name for name in others if self._p_value(name, best)[step] > 1 - confidence),
+            *(name for name in others if self._p_value(name, best)[step] > 1 - CONFIDENCE),
         ]
 
     def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:

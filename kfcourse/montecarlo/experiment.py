@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from itertools import accumulate, islice
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import joblib
 import numpy as np
@@ -30,10 +29,10 @@ from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import check_sizes, design, failed
-from kfcourse.montecarlo.ensemble import Instant, instants, weights
+from kfcourse.montecarlo.ensemble import Ensemble, Instant, side_by_side, weights
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.scores import scored
-from kfcourse.montecarlo.statistics import Sums
+from kfcourse.montecarlo.statistics import Sums, claimed
 from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -194,19 +193,19 @@ def compare(
     if not isinstance(seed, int | np.integer) or seed < 0:
         raise ValueError(f"the seed must be a whole number, not negative, got {seed!r}")
     design_seed, *seeds = np.random.SeedSequence(seed).spawn(1 + min(BATCHES, runs))
-    sizes = batch_sizes(runs)
-    where = (sizes, seeds) if same_ensemble else ([design_runs], [design_seed])
-    ensemble = partial(instants, model, where[0], steps, where[1])
-    sample = Sample(model, steps, sizes, seeds, None if same_ensemble else width(model))
+    wide = None if same_ensemble else width(model)
+    batches = [
+        Ensemble(model, size, steps, each, wide)
+        for size, each in zip(batch_sizes(runs), seeds, strict=True)
+    ]
+    ensemble = batches if same_ensemble else [Ensemble(model, design_runs, steps, design_seed)]
     work = {"jobs": jobs, "progress": progress}
     left_out = dict[str, Reason]()
-    ready = _able(
-        filters, left_out, lambda those: _designed(those, ensemble(), steps, jobs, progress)
-    )
+    ready = _able(filters, left_out, lambda those: _designed(those, ensemble, **work))
     with cluster(dask):
-        result = _compared(ready, sample, seed, left_out, scores=scores, **work)
+        result = _compared(ready, batches, seed, left_out, scores=scores, **work)
         if smoothers:
-            looking_back = _compared(smoothers, sample, seed, {}, back=True, **work)
+            looking_back = _compared(smoothers, batches, seed, {}, back=True, **work)
             result = replace(result, smoothing=looking_back)
     if same_ensemble:
         return result
@@ -238,36 +237,10 @@ def _able(filters: Sequence[F], left_out: dict[str, Reason], work: Callable[[Seq
             filters, left_out[error.filter_name] = rest, error.with_traceback(None)
 
 
-class Sample(NamedTuple):
-    """The trajectories of a comparison: batches of such sizes, each drawn from its seed."""
-
-    model: Model | JumpModel
-    steps: int
-    sizes: list[int]
-    seeds: list[np.random.SeedSequence]
-    wide: float | None = None
-
-    def part(self, batches: slice) -> Sample:
-        """Some of the batches."""
-        return self._replace(sizes=self.sizes[batches], seeds=self.seeds[batches])
-
-    def begun(self, filter_: Filter) -> State:
-        """A filter's state before the first measurement; what draws random numbers draws others for
-        each sample."""
-        state = filter_.init(sum(self.sizes))
-        if not hasattr(state.memory, "part"):
-            return state
-        return state._replace(memory=replace(state.memory, part=self.seeds[0].spawn_key))
-
-    def instants(self) -> Iterator[Instant]:
-        """The steps of all batches side by side."""
-        return instants(self.model, self.sizes, self.steps, self.seeds, self.wide)
-
-
 def _designed(
     filters: Sequence[Filter | Design],
-    ensemble: Iterable[Instant],
-    steps: int,
+    ensemble: Sequence[Ensemble],
+    *,
     jobs: int,
     progress: bool | None,
 ) -> list[Filter]:
@@ -275,48 +248,52 @@ def _designed(
     designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
     if not designs:
         return [filter_ for filter_ in filters if isinstance(filter_, Filter)]
-    ready = iter(design(designs, _progress("designing", steps, "step", progress, ensemble), jobs))
+    steps = side_by_side(ensemble)
+    shown = _progress("designing", ensemble[0].steps, "step", progress, steps)
+    ready = iter(design(designs, shown, jobs))
     return [next(ready) if isinstance(filter_, Design) else filter_ for filter_ in filters]
 
 
 def _compared(
     filters: Sequence[Filter],
-    sample: Sample,
+    batches: Sequence[Ensemble],
     seed: int,
     left_out: dict[str, Reason],
     **options: Any,
 ) -> Comparison:
-    """All filters on the sample that can go on; the others are left out.  Options of `_summed`."""
+    """All filters on the batches that can go on; the others are left out.  Options of `_summed`."""
+
+    first = batches[0]
 
     def summed(those: Sequence[Filter]) -> tuple[Sequence[Filter], Sums]:
         try:
-            return those, _summed(those, sample, **options)
+            return those, _summed(those, batches, **options)
         except NotFinite:
-            if sample.wide is None:
+            if first.wide is None:
                 raise
             # some far start is too far: none but the prior's own
-            return those, _summed(those, sample._replace(wide=None), **options)
+            return those, _summed(those, [replace(b, wide=None) for b in batches], **options)
 
     able, sums = _able(filters, left_out, summed)
-    names, runs = tuple(filter_.name for filter_ in able), sum(sample.sizes)
-    comparison = Comparison(sample.model, names, runs, sample.steps, seed, sums)
+    names, runs = tuple(filter_.name for filter_ in able), sum(batch.runs for batch in batches)
+    comparison = Comparison(first.model, names, runs, first.steps, seed, sums)
     return replace(comparison, left_out=left_out, scored=options.get("scores") is not None)
 
 
 def _summed(
     filters: Sequence[Filter],
-    sample: Sample,
+    batches: Sequence[Ensemble],
     *,
     jobs: int,
     progress: bool | None,
     back: bool = False,
     scores: Structure | None = None,
 ) -> Sums:
-    """The sums over all batches, pieces of which are shared out."""
+    """The sums over all batches, of which pieces are shared out."""
     # slow filters take much memory for each trajectory, and so does looking back
     dear = back or any(filter_.slow for filter_ in filters)
-    each = 1 if dear else max(1, PIECE // max(sample.sizes))
-    parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
+    each = 1 if dear else max(1, PIECE // batches[0].runs)
+    parts = [batches[b : b + each] for b in range(0, len(batches), each)]
     work = (joblib.delayed(run_batches)(filters, part, back=back, scores=scores) for part in parts)
     done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
     return Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
@@ -324,52 +301,70 @@ def _summed(
 
 def run_batches(
     filters: Sequence[Filter],
-    sample: Sample,
+    batches: Sequence[Ensemble],
     *,
     back: bool = False,
     scores: Structure | None = None,
 ) -> Sums:
-    """Advance all filters together over the steps of a sample; `back`: let them look back from its
-    end; `scores`: judge what they expect of measurements."""
-    starts = np.concatenate([[0], np.cumsum(sample.sizes[:-1])]).astype(int)
-    sums = Sums.empty(len(filters), sample.steps, sample.model.n, len(sample.sizes))
+    """Advance all filters together over the steps of some batches; `back`: let them look back from
+    the end; `scores`: judge what they expect of measurements."""
+    model, steps, wide = batches[0].model, batches[0].steps, batches[0].wide
+    starts = np.cumsum([0, *(batch.runs for batch in batches[:-1])])
+    sums = Sums.empty(len(filters), steps, model.n, len(batches))
     exact = next((i for i, filter_ in enumerate(filters) if filter_.name == EXACT), None)
-    angles = sample.model.angles.x
+    angles = model.angles.x
+
+    def total(values: Array) -> Array:
+        """The weighted sums over each batch, of (..., runs)."""
+        return np.add.reduceat(weight * values, starts, axis=-1)
+
     # what diverges is reported below, by name
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        for k, (instant, before, laws) in enumerate((_back if back else _onward)(filters, sample)):
+        for k, (instant, before, laws) in enumerate((_back if back else _onward)(filters, batches)):
             if k == 0:
-                weight = weights(sample.model.prior, instant.x, sample.wide)
+                weight = weights(model.prior, instant.x, wide)
                 sums.weight[:] = np.add.reduceat(weight, starts)
-            sums.size[k] = np.add.reduceat(weight * (instant.x**2).sum(axis=1), starts)
+            sums.size[k] = total((instant.x**2).sum(axis=1))
             for i, state in enumerate(laws):
                 with _named(filters[i], k):
-                    x = near(instant.x, state.posterior.mean, angles)
-                    sums.record(i, k, x, state.posterior, weight, starts)
+                    error = near(instant.x, state.posterior.mean, angles) - state.posterior.mean
+                    square = error**2
+                    sums.error[i, k], sums.square[i, k] = total(error.T), total(square.T)
+                    largest = weight * square.sum(axis=1)
+                    sums.largest[i, k] = np.maximum.reduceat(largest, starts)
+                    own, normalised = claimed(error, state.posterior.cov)
+                    sums.own[i, k], sums.normalised[i, k] = total(own), total(normalised)
                     if scores is not None:
                         both = scored(filters[i], scores, before[i], instant.y, state)
-                        sums.log_score[i, k], sums.crps[i, k] = (
-                            np.add.reduceat(weight * values, starts) for values in both
-                        )
+                        sums.log_score[i, k], sums.crps[i, k] = map(total, both)
             if exact is None:
                 continue
             first, second, error = _twice(laws[exact])
-            sums.doubt[k] = np.add.reduceat(weight * error**2, starts)
+            sums.doubt[k] = total(error**2)
             for i in {*range(len(laws))} - {exact}:
                 mean = laws[i].posterior.mean
                 product = difference(mean, first, angles) * difference(mean, second, angles)
-                sums.distance[i, k] = np.add.reduceat(weight * product.sum(axis=1), starts)
+                sums.distance[i, k] = total(product.sum(axis=1))
     _check_finite(filters, sums)
     return sums
+
+
+def _begun(filter_: Filter, batches: Sequence[Ensemble]) -> State:
+    """A filter's state before the first measurement; what draws random numbers draws others for
+    each piece of work."""
+    state = filter_.init(sum(batch.runs for batch in batches))
+    if not hasattr(state.memory, "part"):
+        return state
+    return state._replace(memory=replace(state.memory, part=batches[0].seed.spawn_key))
 
 
 Stage = tuple[Instant, list[State], list[State]]
 
 
-def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
+def _onward(filters: Sequence[Filter], batches: Sequence[Ensemble]) -> Iterator[Stage]:
     """The states of all filters before and after each measurement."""
-    states = [sample.begun(filter_) for filter_ in filters]
-    for k, instant in enumerate(sample.instants()):
+    states = [_begun(filter_, batches) for filter_ in filters]
+    for k, instant in enumerate(side_by_side(batches)):
         before = [*states]
         for i, filter_ in enumerate(filters):
             with _named(filter_, k):
@@ -377,14 +372,14 @@ def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
         yield instant, before, states
 
 
-def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
+def _back(filters: Sequence[Filter], batches: Sequence[Ensemble]) -> Iterator[Stage]:
     """What all filters tell of each step once they have seen the last."""
-    record = list(sample.instants())
+    record = list(side_by_side(batches))
     y = np.stack([instant.y for instant in record])
     laws = []
     for filter_ in filters:
         with _named(filter_, len(record) - 1):
-            states = accumulate(y, filter_.step, initial=sample.begun(filter_))
+            states = accumulate(y, filter_.step, initial=_begun(filter_, batches))
             laws.append(looked_back(filter_, islice(states, 1, None), y))
     for instant, after in zip(record, map(list, zip(*laws, strict=True)), strict=True):
         yield instant, [], after

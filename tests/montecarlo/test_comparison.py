@@ -18,9 +18,9 @@ from kfcourse.filters.particles import particle
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.ensemble import instants, stratified, weights
+from kfcourse.montecarlo.ensemble import Ensemble, side_by_side, stratified, weights
 from kfcourse.montecarlo.experiment import batch_sizes, compare, run
-from kfcourse.montecarlo.statistics import Estimate, Sums, rejected
+from kfcourse.montecarlo.statistics import Estimate, Sums, claimed, rejected
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -44,7 +44,8 @@ def stored(model, runs, steps, seed):
     runs, p)."""
     sizes = batch_sizes(runs)
     _, *seeds = np.random.SeedSequence(seed).spawn(1 + len(sizes))
-    x, y, *_ = zip(*instants(model, sizes, steps, seeds), strict=True)
+    batches = [Ensemble(model, *of) for of in zip(sizes, [steps] * len(sizes), seeds, strict=True)]
+    x, y, *_ = zip(*side_by_side(batches), strict=True)
     return np.stack(x), np.stack(y)
 
 
@@ -109,20 +110,13 @@ def test_a_claim_of_variance_0_is_right_without_an_error_and_infinitely_wrong_wi
     x = np.array([1.0, -2.0, 3.0, 0.5, -1.5])
     p = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
 
-    def recorded(errors, cov):
-        sums = Sums.empty(1, 1, 1, 2)
-        law = Gaussian(np.zeros((5, 1)), cov)
-        sums.record(0, 0, errors[:, None], law, np.ones(5), np.array([0, 2]))
-        return sums.normalised[0, 0]
+    def normalised(errors, cov):
+        return claimed(errors[:, None], cov)[1].tolist()
 
-    known = np.where(p > 0, x, 0.0)
-    quotients = np.array([0.0, 2.0, 0.0, 1.0, 2.25])
-    np.testing.assert_allclose(
-        recorded(known, p[:, None, None]), [quotients[:2].sum(), quotients[2:].sum()], rtol=1e-14
-    )
-    assert recorded(known, np.array([[0.0]])).tolist() == [np.inf, np.inf]
-    assert recorded(np.zeros(5), np.array([[0.0]])).tolist() == [0, 0]
-    assert recorded(x, p[:, None, None]).tolist() == [np.inf, np.inf]
+    known, none = np.where(p > 0, x, 0.0), np.array([[0.0]])
+    assert normalised(known, p[:, None, None]) == [0.0, 2.0, 0.0, 1.0, 2.25]
+    assert normalised(known, none) == np.where(known, np.inf, 0.0).tolist()
+    assert normalised(x, p[:, None, None]) == [np.inf, 2.0, np.inf, 1.0, 2.25]
 
 
 def test_differences_and_ratios_are_paired(direct):

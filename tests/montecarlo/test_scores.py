@@ -9,7 +9,8 @@ import scipy
 from kfcourse import Model, compare, gaussian, linearised
 from kfcourse.filters import aof, duof, gpb2, imm, kalman_filter, pointmass
 from kfcourse.laws import Gaussian
-from kfcourse.montecarlo.experiment import Sample, batch_sizes, states
+from kfcourse.montecarlo.ensemble import Ensemble, side_by_side
+from kfcourse.montecarlo.experiment import batch_sizes, states
 from kfcourse.montecarlo.scores import crps, scored
 from kfcourse.symbolic.jumping import JumpModel
 
@@ -65,7 +66,9 @@ def test_a_slow_loop():
     filters = [aof(tangent), duof(model)]
     compared = compare(filters, model, 66, 2, seed=4, scores=normal, same_ensemble=True)
     seeds = np.random.SeedSequence(4).spawn(65)[1:]
-    y = np.stack([one.y for one in Sample(model, 2, batch_sizes(66), seeds).instants()])
+    sizes = zip(batch_sizes(66), seeds, strict=True)
+    batches = [Ensemble(model, size, 2, seed) for size, seed in sizes]
+    y = np.stack([one.y for one in side_by_side(batches)])
     law, norm = scipy.stats.multivariate_normal, scipy.stats.norm
     wanted = []
     for k, state in enumerate(states(filters[0], y)[:-1]):
