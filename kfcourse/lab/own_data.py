@@ -22,7 +22,7 @@ from kfcourse.filters.base import Filter
 from kfcourse.filters.gate import gated
 from kfcourse.lab.report import save_figure, save_texts
 from kfcourse.lab.report_text import lines_of, ranges
-from kfcourse.lab.variants import Variant, VariantError, chosen_variants, find_variant
+from kfcourse.lab.variants import MANY, Variant, VariantError, chosen_variants, find_variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.consistency import Innovations, autocorrelation
 from kfcourse.records.estimation import Likeliest, estimate
@@ -40,8 +40,7 @@ STRUCTURES: dict[str, Callable[[Model], Structure]] = {
     "gauss-hermite": gauss_hermite,
 }
 LAGS = 20  # of the autocorrelation
-MANY = 5000  # steps above which curves are stored as points of a picture, not one by one
-NAMED = 40  # refused measurements that the report lists
+PICTURE = 5000  # steps above which curves are stored as a picture, not point by point
 ESTIMATE, SMOOTHED, MEASURED, REFUSED = "#0072B2", "#009E73", "#777777", "#D55E00"
 # Of each kind of finding: what it is, and what a bad one says.
 KINDS = {
@@ -97,8 +96,8 @@ class Analysis(NamedTuple):
         if self.gate is not None:
             # with some components at least
             refused = np.flatnonzero(weight < 1) + 1
-            where = ": rows " + ranges(refused[:NAMED].tolist()) if len(refused) else ""
-            more = ", ..." if len(refused) > NAMED else ""
+            where = ": rows " + ranges(refused[:MANY].tolist()) if len(refused) else ""
+            more = ", ..." if len(refused) > MANY else ""
             sentences.append(
                 f"The gate refused {len(refused)} of {steps - missing} measurements{where}{more}."
             )
@@ -279,7 +278,7 @@ def _labelled(ax: Axes, across: str, up: str) -> None:
 
 def _curve(ax: Axes, x: Array, y: Array, style: str = "-", half: Any = None, **of: Any) -> None:
     """A curve, and a band of so much to both sides; of a long record as a picture."""
-    of["rasterized"] = len(x) > MANY
+    of["rasterized"] = len(x) > PICTURE
     ax.plot(x, y, style, linewidth=1, markersize=4, **of)
     if half is not None:
         band = {"color": of["color"], "rasterized": of["rasterized"]}

@@ -101,7 +101,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
     ----------
     variant : Variant
     runs : int
-        Trajectories, at least 256; a vector model gets an eighth of them.
+        Trajectories, at least 128; a vector model gets an eighth of them.
     seed : int
     ask : callable, optional
         Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None;
@@ -174,7 +174,7 @@ def examine_all(
     ask: Ask | None = None,
 ) -> Iterator[Quality]:
     """`examine` every variant, in order, in so many processes, on which no number depends."""
-    parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
+    parallel = joblib.Parallel(n_jobs=jobs, return_as="generator")
     done = parallel(joblib.delayed(examine)(variant, runs, seed, ask) for variant in variants)
     yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 

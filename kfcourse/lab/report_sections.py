@@ -44,7 +44,6 @@ from kfcourse.symbolic.writing import formula_latex, number_latex
 ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
-HIGHEST = 8  # moment that is printed
 
 # Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
 # gives.
@@ -314,7 +313,7 @@ class StudentReport:
             return []
         m, d = sp.symbols("m d", real=True)
         law = GaussianMoments([x], [m], sp.Matrix([[d]]))
-        highest = min(max(int(sp.degree(sp.expand(side), x)) for side in sides), HIGHEST)
+        highest = max(int(sp.degree(sp.expand(side), x)) for side in sides)
         return [
             f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}"
             for n in range(2, highest + 1)

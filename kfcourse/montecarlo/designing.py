@@ -8,8 +8,8 @@ share the designs.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
+import joblib
 import numpy as np
 
 from kfcourse.errors import NotFinite, Refused, expect
@@ -55,15 +55,15 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
         expect(design_, Design, "design")
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     states = list[State]()
-    with ThreadPoolExecutor(jobs) as pool:
+    with joblib.Parallel(jobs, prefer="threads") as parallel:
         for k, instant in enumerate(ensemble):
             if k == 0:
                 check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
                 states = [design_.init(len(instant.x)) for design_ in designs]
-            given = [
-                (design_, state, instant, k) for design_, state in zip(designs, states, strict=True)
-            ]
-            results = list(pool.map(lambda task: _fitted(*task), given))
+            results = parallel(
+                joblib.delayed(_fitted)(design_, state, instant, k)
+                for design_, state in zip(designs, states, strict=True)
+            )
             states = [state for state, _ in results]
             for table, (_, fits) in zip(coefficients, results, strict=True):
                 table.append(fits)

@@ -199,7 +199,7 @@ def compare(
         for size, each in zip(batch_sizes(runs), seeds, strict=True)
     ]
     ensemble = batches if same_ensemble else [Ensemble(model, design_runs, steps, design_seed)]
-    work = {"jobs": jobs, "progress": progress}
+    work: dict[str, Any] = {"jobs": jobs, "progress": progress}
     left_out = dict[str, Reason]()
     ready = _able(filters, left_out, lambda those: _designed(those, ensemble, **work))
     with cluster(dask):

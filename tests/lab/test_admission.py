@@ -76,6 +76,10 @@ def test_what_can_be_built_and_will_not_do_is_warned_of(variant53):
     unseen = "see 0 % of the variance of the measurement that the state does not explain"
     assert unseen in found["aof-unscented"].says
     assert found["particle"].says == found["aof-exact"].says == ""
+    # of the variance c^2 + 1 of (c + x) w the points see c^2: less than half of it, or more
+    for part, verdict in ((0.8, "poor"), (1.2, "yes")):
+        seen = verdicts(Model.define("0.9*x + v", f"x + ({part} + x)*w"), ["aof-unscented"])
+        assert seen["aof-unscented"].verdict == verdict
     found = verdicts(Model.define("0.9*x + v", "x**2 + w"))
     assert kinds(found, "poor") >= LINEARISED
     assert "tangent of y at the prior's mean is level" in found["fos3-linearised"].says

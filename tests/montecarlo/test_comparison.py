@@ -292,10 +292,15 @@ def test_what_is_better_than_the_exact_filter_refutes_it(variant53):
     own = {"aof-gaussian": np.ones(50), "aof-exact": np.full(50, 4.0)}
     refuted = by_hand(variant53, squares, own)
     assert refuted.doubtful.all() and np.isnan(refuted.gap("aof-gaussian").value).all()
-    healthy = by_hand(variant53, squares | {"aof-gaussian": 4 + rng.normal(size=50)}, own)
-    assert not healthy.doubtful.any()
-    unsure = replace(healthy, sums=healthy.sums._replace(doubt=np.full((1, 50), 0.8)))
-    assert unsure.doubtful.all()
+    noise = rng.normal(size=50)
+    noise = (noise - noise.mean()) / noise.std(ddof=1)
+    for errors, refutes in ((3, False), (6, True)):  # standard errors below the bound
+        better = squares | {"aof-gaussian": 4 + noise - errors / np.sqrt(50)}
+        assert by_hand(variant53, better, own).doubtful.all() == refutes
+    healthy = by_hand(variant53, squares | {"aof-gaussian": 4 + noise}, own)
+    for doubt, refutes in ((0.3, False), (0.5, True)):  # a tenth of the variance is .4
+        unsure = replace(healthy, sums=healthy.sums._replace(doubt=np.full((1, 50), doubt)))
+        assert unsure.doubtful.all() == refutes
 
 
 def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
@@ -306,6 +311,12 @@ def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
     result = by_hand(variant53, {"aof-gaussian": wild, "good": base, "bad": 1000 * base})
     assert [*result.lost] == ["aof-gaussian"]
     assert result.control == "good"
+    # a hundred times the best D_k, a tenth of it by one trajectory
+    for ordinary, far, lost in (
+        (1, 8e4, False), (1, 1.2e5, True), (200, 1.5e4, False), (200, 4e4, True),
+    ):  # fmt: skip
+        wild = np.where(np.arange(1000) == 7, far, ordinary)
+        assert bool(by_hand(variant53, {"wild": wild, "good": base}).lost) == lost
 
 
 def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
