@@ -153,12 +153,13 @@ Advance = Callable[..., Instant]
 
 
 def _moving(model: Model) -> Advance:
-    """One step of the model: (k, x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
+    """One step of the model: (k, x, standard v, w) -> x, y = b(x, w), x' = a(x, v)."""
     state, meter = compile_model(model)
 
     def advance(k: int, x: Array, v: Array, w: Array) -> Instant:
         with np.errstate(over="ignore", invalid="ignore"):  # who looks at it reports what diverges
-            y, x_next = meter(x, w, k), state(x, v, k)
+            y = meter(x, _of_law(w, model.meter_noise), k)
+            x_next = state(x, _of_law(v, model.state_noise), k)
         # a formula without noise and state is one constant for all trajectories
         y = np.broadcast_to(y, (len(x), model.p))
         x_next = np.broadcast_to(x_next, (len(x), model.n))
@@ -219,14 +220,16 @@ def _initial(ensemble: Ensemble) -> list[Array]:
 
 
 def _noises(ensemble: Ensemble, key: int, steps: int) -> list[Array]:
-    """Noises v and w of a few steps, (steps, runs, r); of a model that jumps standard, and (steps,
-    runs) in 0 to 1."""
+    """Standard normal numbers for v and w of a few steps, (steps, runs, r); of a model that jumps
+    also (steps, runs) in 0 to 1."""
     model, runs, rng = ensemble.model, ensemble.runs, _stream(ensemble.seed, 0, key)
-    if isinstance(model, JumpModel):
-        noises = (model.modes[0].v, model.modes[0].w)
-        drawn = [rng.standard_normal((steps, len(noise), runs)).swapaxes(1, 2) for noise in noises]
-        return [*drawn, rng.random((steps, runs))]
-    return [_normal(rng, law, steps, runs) for law in (model.state_noise, model.meter_noise)]
+    mode = model.modes[0] if isinstance(model, JumpModel) else model
+    # every component contiguous in memory
+    drawn = [
+        rng.standard_normal((steps, len(law.mean), runs)).swapaxes(1, 2)
+        for law in (mode.state_noise, mode.meter_noise)
+    ]
+    return [*drawn, rng.random((steps, runs))] if isinstance(model, JumpModel) else drawn
 
 
 def _chosen(probabilities: Array, u: Array) -> Array:
@@ -236,13 +239,6 @@ def _chosen(probabilities: Array, u: Array) -> Array:
 
 
 def _of_law(standard: Array, law: Gaussian) -> Array:
-    return law.mean + standard @ square_root(law.cov).T
-
-
-def _normal(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
-    """Gaussian noise (steps, size, r), every component contiguous in memory."""
-    r = len(law.mean)
-    standard = rng.standard_normal((steps, r, size)).swapaxes(1, 2)
-    if not law.mean.any() and np.array_equal(law.cov, np.eye(r)):
+    if not law.mean.any() and np.array_equal(law.cov, np.eye(len(law.mean))):
         return standard
-    return _of_law(standard, law)
+    return law.mean + standard @ square_root(law.cov).T

@@ -9,7 +9,7 @@ So differences, ratios and means over steps need no formula of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -76,11 +76,8 @@ class Estimate:
             self.standard_error == 0, certain, 2 * scipy.special.stdtr(self.freedom, -np.abs(t))
         )
 
-    def __iter__(self) -> Iterator[Estimate]:
-        """Along the first axis: the steps, one after the other."""
-        return (self[k] for k in range(len(self.value)))
-
     def __getitem__(self, index) -> Estimate:
+        """That of some places; an iteration goes over the steps."""
         return Estimate(self.value[index], self.standard_error[index], self.freedom)
 
 

@@ -120,7 +120,8 @@ def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
     times, _, y = practitioner_s_track(2)
     written(place / "track.csv", times, y)
     told = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"))
-    own_data._whiteness(told, 0, ax)
+    passed = told.examined.passed[:, 0, 0]
+    own_data._whiteness(own_data.columns_of(told), "y1", passed, ax)
     assert len(ax.lines[3].get_xdata()) == 20
 
 

@@ -390,6 +390,9 @@ def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
         assert by_hand(variant53, {name: squares[name] for name in ("also", "same")}).leaders(
             0
         ) == ["also", "same"]
+    for more, worst in ((0.7e-10, ""), (1.5e-10, "worse")):  # parts of D_k
+        result = by_hand(variant53, {"best": base, "worse": (1 + more) * base})
+        assert result.verdicts()[0].worst == worst
 
 
 def test_where_all_errors_are_zero_filters_are_equal(variant53):
@@ -402,6 +405,10 @@ def test_where_all_errors_are_zero_filters_are_equal(variant53):
     assert np.isnan(result.relative("aof-linearised").value).all()  # of nothing, nothing is a part
     assert result.score("aof-linearised").standard_error == 0
     assert not any(verdict.worst for verdict in result.verdicts())
+    # of states of size 1 in doubles, (64 eps)^2 = 2e-28
+    for square, rounded in ((1.5e-28, True), (3e-28, False)):
+        result = by_hand(variant53, {"aof-gaussian": np.full(4, square)})
+        assert result.without_error.all() == rounded
 
 
 # ---------------------------------------------------------------- the table of the page
