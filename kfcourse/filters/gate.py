@@ -55,12 +55,18 @@ class Gate(NamedTuple):
         Which components passed.
     inner : object
         The memory of the filter behind the gate.
+    edge : float
+        With which probability the gate lets pass.
+    by_component : bool
+        Whether it judges each component for itself.
     """
 
     weight: Array
     in_a_row: Array
     passed: Array
     inner: Any
+    edge: float
+    by_component: bool
 
 
 def gated(
@@ -141,10 +147,9 @@ def gated(
 
     def init(runs: int) -> State:
         state = filter_.init(runs)
-        nothing = np.zeros((runs, filter_.model.p), dtype=bool)
-        return state._replace(
-            memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), nothing, state.memory)
-        )
+        nothing, none = np.zeros((runs, filter_.model.p), dtype=bool), np.zeros(runs, dtype=int)
+        memory = Gate(none + np.nan, none, nothing, state.memory, probability, by_component)
+        return state._replace(memory=memory)
 
     def step(state: State, y: Array) -> State:
         expected, _, _, beyond = judged(state, y)
@@ -163,7 +168,8 @@ def gated(
             after = after._replace(
                 predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None])
             )
-        return after._replace(memory=Gate(weight, in_a_row, passed, after.memory))
+        memory = Gate(weight, in_a_row, passed, after.memory, probability, by_component)
+        return after._replace(memory=memory)
 
     def evidence(before: State, y: Array, after: State) -> Array:
         expected, size, limit, beyond = judged(before, y)

@@ -172,9 +172,7 @@ def estimate_record(
         likeliest = estimate(record.model, record.y, unknown, positive, build) if unknown else None
         if likeliest:
             record = record._replace(model=likeliest.model)
-        examined = examine(
-            build(record.model), record.y, 1.0 if gate is None else gate, by_component
-        )
+        examined = examine(build(record.model), record.y)
         result = Analysis(variant, record, structure, gate, likeliest, examined)
     except NoDensity as error:
         raise RecordError(
@@ -230,13 +228,13 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
             f"Innovations of {name} between bounds of two standard deviations; 95 of 100 lie "
             "within if the filter is right."
         )
-        draw = partial(_innovations, times, columns, name, passed)
-        pictures[f"innovations-{name}"] = about, draw
+        of = (columns, name, passed)
+        pictures[f"innovations-{name}"] = about, partial(_innovations, times, *of)
         about = (
             f"Correlation of the innovations of {name} with later ones; between the bounds in 95 "
             "of 100 lags if they are white."
         )
-        pictures[f"whiteness-{name}"] = about, partial(_whiteness, columns, name, passed)
+        pictures[f"whiteness-{name}"] = about, partial(_whiteness, *of)
     content = {
         "result": result,
         "model": lines_of(model.latex()),

@@ -27,12 +27,15 @@ def failed(name: str, step: int, error: Exception) -> NotFinite:
     return NotFinite(words, name, kind, step=step)
 
 
-def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1) -> list[Filter]:
+def design(
+    filters: Sequence[Filter | Design], ensemble: Iterable[Instant], jobs: int = 1
+) -> list[Filter]:
     """Fit every design on the same trajectories.
 
     Parameters
     ----------
-    designs : sequence of Design
+    filters : sequence of Design
+        A `Filter` among them stays as it is.
     ensemble : iterable of Instant
         For each step x_k, y_k and x_{k+1}: an `Ensemble`, or stored trajectories.
     jobs : int
@@ -41,7 +44,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
     Returns
     -------
     list of Filter
-        In the order of `designs`, for as many steps as the ensemble has.
+        In the order of `filters`; the designed ones for as many steps as the ensemble has.
 
     Raises
     ------
@@ -51,12 +54,13 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
         If a regression meets infinite or NaN values, or a filter a negative variance: the model or
         the filter diverges.
     """
-    for design_ in designs:
-        expect(design_, Design, "design")
+    for filter_ in filters:
+        expect(filter_, Design, "design", Filter)
+    designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     states = list[State]()
     with joblib.Parallel(jobs, prefer="threads") as parallel:
-        for k, instant in enumerate(ensemble):
+        for k, instant in enumerate(ensemble if designs else ()):
             if k == 0:
                 check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
                 states = [design_.init(len(instant.x)) for design_ in designs]
@@ -67,9 +71,10 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
             states = [state for state, _ in results]
             for table, (_, fits) in zip(coefficients, results, strict=True):
                 table.append(fits)
+    tables = iter(coefficients)
     return [
-        design_.with_coefficients(table)
-        for design_, table in zip(designs, coefficients, strict=True)
+        filter_.with_coefficients(next(tables)) if isinstance(filter_, Design) else filter_
+        for filter_ in filters
     ]
 
 

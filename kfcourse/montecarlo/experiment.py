@@ -201,7 +201,12 @@ def compare(
     ensemble = batches if same_ensemble else [Ensemble(model, design_runs, steps, design_seed)]
     work: dict[str, Any] = {"jobs": jobs, "progress": progress}
     left_out = dict[str, Reason]()
-    ready = _able(filters, left_out, lambda those: _designed(those, ensemble, **work))
+
+    def designed(those: Sequence[Filter | Design]) -> list[Filter]:
+        shown = _progress("designing", steps, "step", progress, side_by_side(ensemble))
+        return design(those, shown, jobs)
+
+    ready = _able(filters, left_out, designed)
     with cluster(dask):
         result = _compared(ready, batches, seed, left_out, scores=scores, **work)
         if smoothers:
@@ -209,8 +214,8 @@ def compare(
             result = replace(result, smoothing=looking_back)
     if same_ensemble:
         return result
-    designed = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
-    return replace(result, designed=tuple(designed))
+    designs = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
+    return replace(result, designed=tuple(designs))
 
 
 def width(model: Model | JumpModel) -> float | None:
@@ -235,23 +240,6 @@ def _able(filters: Sequence[F], left_out: dict[str, Reason], work: Callable[[Seq
             if not rest or len(rest) == len(filters):
                 raise
             filters, left_out[error.filter_name] = rest, error.with_traceback(None)
-
-
-def _designed(
-    filters: Sequence[Filter | Design],
-    ensemble: Sequence[Ensemble],
-    *,
-    jobs: int,
-    progress: bool | None,
-) -> list[Filter]:
-    """The filters in their order, those that need it designed on the ensemble."""
-    designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
-    if not designs:
-        return [filter_ for filter_ in filters if isinstance(filter_, Filter)]
-    steps = side_by_side(ensemble)
-    shown = _progress("designing", ensemble[0].steps, "step", progress, steps)
-    ready = iter(design(designs, shown, jobs))
-    return [next(ready) if isinstance(filter_, Design) else filter_ for filter_ in filters]
 
 
 def _compared(

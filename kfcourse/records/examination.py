@@ -64,8 +64,8 @@ class Examination(NamedTuple):
     weight: Array
     passed: Array
     log_likelihood: Array
-    edge: float = 1.0
-    by_component: bool = False
+    edge: float
+    by_component: bool
 
 
 class Finding(NamedTuple):
@@ -82,32 +82,25 @@ class Finding(NamedTuple):
         return bool(self.low <= self.value <= self.high)
 
 
-def examine(
-    filter_: Filter, y: Array, edge: float = 1.0, by_component: bool = False
-) -> Examination:
+def examine(filter_: Filter, y: Array) -> Examination:
     """Run a filter over a record, look back, and keep what it expected.  A long record shows its
     progress.
 
     Parameters
     ----------
     filter_ : Filter
-        With structural functions of its own; `gated(...)` too, with its probability as `edge`,
-        above 0 and at most 1, and its `by_component`.
+        With structural functions of its own; `gated(...)` too.
     y : ndarray (steps, runs, p)
         As for `run`.
 
     Raises
     ------
     ValueError
-        A filter without structural functions, an edge that is no probability, measurements of
-        another shape, no likelihood (`kfcourse.likelihood`), a noise with a negative variance, as
-        sqrt(u) has where an input u is negative.
+        A filter without structural functions, measurements of another shape, no likelihood
+        (`kfcourse.likelihood`), a noise with a negative variance, as sqrt(u) has where an input u
+        is negative.
     """
     expect(filter_, Filter, "examine")
-    if not 0 < edge <= 1:
-        raise ValueError(
-            f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}"
-        )
     structure, y = structure_of(filter_, "an examination of a record"), measurements(filter_, y)
     visited = list(shown_progress(walk(filter_, y), "filter", len(y) + 1))
     innovations, F = np.empty(y.shape), np.empty((*y.shape, y.shape[-1]))
@@ -130,8 +123,8 @@ def examine(
         np.where(np.isnan(y).all(axis=-1), np.nan, weight),
         passed,
         log_densities(filter_, visited, y),
-        edge,
-        by_component,
+        getattr(visited[-1].memory, "edge", 1.0),
+        getattr(visited[-1].memory, "by_component", False),
     )
 
 

@@ -20,11 +20,16 @@ from kfcourse.lab.quality import (
     bounded,
     examine,
     examine_all,
+    not_diverging,
+    solvable,
     table,
 )
+from kfcourse.lab.short_names import Structures
 from kfcourse.lab.variants import STEPS, read_variant
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo import FEWEST
+from kfcourse.montecarlo import BATCHES, FEWEST
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.statistics import Sums
 
 SHIPPED = load_variants()
 
@@ -130,13 +135,21 @@ def test_a_bad_variant_is_refused_for_its_reason(case):
         assert "filters differ" not in found.findings
 
 
-def test_long_formulas_are_refused(monkeypatch):
-    monkeypatch.setattr("kfcourse.lab.quality.LONGEST", 20)
-    found = examine(SHIPPED["53"], FEWEST)
-    assert (
-        found.faults["solvable"]
-        == "closed form, 28 operations in the Gaussian structural functions, more than 20"
-    )
+def test_long_formulas_are_refused():
+    for power, says in ((9, "557 operations"), (10, "693 operations")):
+        model = Model.define("0.9*x + v", f"(1 + x)**{power} + w")
+        found = solvable(Structures(model))
+        assert says in found.says and found.ok == ("more than 600" not in found.says)
+        assert found.ok == (power == 9)
+
+
+def test_a_filter_diverges_at_ten_times_the_variance_of_the_state():
+    x = np.random.default_rng(1).normal(size=(1, BATCHES, 1))
+    for times, diverges in ((8, False), (12, True)):
+        sums = Sums.empty(1, 1, 1, BATCHES)
+        sums.weight[:], sums.square[:] = 1, times * x.var()
+        result = Comparison(SHIPPED["53"].model, ("duof",), BATCHES, 1, 1, sums)
+        assert bool(not_diverging(result, x)) == diverges
 
 
 def test_a_derivation_without_end_is_given_up(monkeypatch):

@@ -105,23 +105,6 @@ def test_the_exact_filter_has_the_most():
     assert np.isnan(compared.crps("aof-exact").value).all()
 
 
-def test_modes_are_judged_by_their_mixture():
-    model = JumpModel.define(
-        "0.9*x + 0.6*v",
-        "1.5*x + g*w",
-        {"g": 0.5},
-        modes={"good": {}, "bad": {"parameters": {"g": 6}}},
-        transition=[0.8, 0.2],
-    )
-    structures = [linearised(mode) for mode in model.modes]
-    filters = [imm(structures, model, model.first), aof(structures[0])]
-    compared = compare(filters, model, 1000, 4, seed=3, scores=structures[0])
-    more = compared.log_score("imm", minus="aof-linearised", steps=slice(None))
-    assert more.value > 4 * more.standard_error
-    less = compared.crps("imm", minus="aof-linearised", steps=slice(None))
-    assert less.value < -4 * less.standard_error
-
-
 @pytest.mark.parametrize("build", [imm, gpb2])
 def test_the_mixture_of_a_filter_with_modes(build):
     """Two correlated meters in two modes, one trajectory by quadrature: weights and
