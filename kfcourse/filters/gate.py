@@ -141,7 +141,8 @@ def gated(
             variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
             size, limit = expected.innovation(y) ** 2 / variances, limits[[1]]
         else:
-            size, limit = _size(expected, y)[:, None], limits[(~np.isnan(y)).sum(axis=-1)][:, None]
+            size = size_of(expected.innovation(y), expected.F)[:, None]
+            limit = limits[(~np.isnan(y)).sum(axis=-1)][:, None]
         lost = patience is not None and state.memory.in_a_row >= patience
         return expected, size, limit, (size > limit) & ~np.asarray(lost)[..., None]
 
@@ -160,9 +161,8 @@ def gated(
             missing, np.nan, passed.sum(axis=-1) / np.maximum(measured.sum(axis=-1), 1)
         )
         refused = weight == 0
-        in_a_row = np.where(
-            missing, state.memory.in_a_row, np.where(refused, state.memory.in_a_row + 1, 0)
-        )
+        before = state.memory.in_a_row
+        in_a_row = np.where(missing, before, (before + 1) * refused)
         if patience is not None and (losing := refused & (in_a_row == patience)).any():
             wider = np.where(losing, _widening(expected, state.predicted, y), 1.0)
             after = after._replace(
@@ -192,11 +192,10 @@ def gated(
     )
 
 
-def _size(expected: Measurement, y: Array) -> Array:
+def size_of(innovation: Array, F: Array) -> Array:
     """nu^T F^-1 nu of what was measured, (runs,)."""
-    innovation, F = expected.innovation(y), expected.F
     if any_missing(innovation):
-        innovation, _, F, _ = without_missing(innovation, expected.G, F, expected.R)
+        innovation, _, F, _ = without_missing(innovation, np.zeros_like(F), F, F)
     return normalised_square(innovation, F)
 
 

@@ -29,11 +29,11 @@ from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
 from kfcourse.lab.families import WORDS
 from kfcourse.lab.report_modes import JumpReport
-from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
+from kfcourse.lab.report_sections import LEVEL, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
 from kfcourse.lab.short_names import title
 from kfcourse.lab.variants import Variant
-from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.comparison import ALIKE, Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
@@ -178,11 +178,11 @@ def conclusions(result: Comparison) -> list[str]:
     for better, worse in pairwise(ranked):
         difference = result.mean_gap_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval())
-        if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model
+        if max(-low, high) < 100 * ALIKE:  # filters that coincide, as on a linear model
             sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
             continue
         verdict = (
-            "is more accurate than" if low > ROUNDING else "is not significantly different from"
+            "is more accurate than" if low > 100 * ALIKE else "is not significantly different from"
         )
         sentences.append(
             f"{title(better)} {verdict} {title(worse)}: "

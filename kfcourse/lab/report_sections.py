@@ -33,7 +33,7 @@ from kfcourse.lab.report_text import (
 )
 from kfcourse.lab.short_names import Structures, entry, title
 from kfcourse.laws import CONFIDENCE
-from kfcourse.montecarlo.comparison import Comparison, Verdict
+from kfcourse.montecarlo.comparison import ALIKE, Comparison, Verdict
 from kfcourse.montecarlo.modes import Recognised
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
@@ -41,7 +41,6 @@ from kfcourse.symbolic.reading import exact_matrix
 from kfcourse.symbolic.structure import FUNCTION_LATEX, Structure
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
-ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
 
@@ -461,7 +460,7 @@ class StudentReport:
         else:
             yield words["nobody_last"]
         # the control, or its equal
-        leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING
+        leads = not result.has_bound and abs(float(result.ranking()[0][1].value)) < ALIKE
         yield self.mean_sentence(
             "mean_first" if leads else "mean_bound" if result.has_bound else "mean_control"
         )

@@ -29,7 +29,8 @@ HEAVY = 0.1  # part of D_k that a single trajectory makes where the filter diver
 # of the bound: standard error at least of what is said of a single step, as rare trajectories carry
 # what is smaller
 RESOLUTION = 5e-4
-ALIKE = 1e-10  # of D_k: filters that differ by less coincide but for rounding
+# of D_k: filters that differ by less coincide, as half of their digits may be lost on the way
+ALIKE = 1e-8
 
 
 class Verdict(NamedTuple):

@@ -27,8 +27,9 @@ from tqdm import tqdm
 
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, structure_of
+from kfcourse.filters.gate import size_of
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, stacked
 from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import measurements, walk
 from kfcourse.records.evidence import log_densities
@@ -196,7 +197,7 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
         size = np.nansum(value**2 / np.diagonal(F, axis1=-2, axis2=-1)) / degrees.sum()
         mean, variance = (degrees * part for part in _below(np.ones(1), examined.edge))
     else:
-        size = _sizes(value, F).sum() / degrees.sum()
+        size = size_of(value, F).sum() / degrees.sum()
         mean, variance = _below(degrees, examined.edge)
     scale = variance.sum() / mean.sum()
     low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, TAILS) / degrees.sum()
@@ -212,12 +213,6 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
                 bound = z / np.sqrt(len(terms))
                 result.append(Finding(kind + name, float(terms.mean()), -bound, bound))
     return result
-
-
-def _sizes(value: Array, F: Array) -> Array:
-    """nu^T F^-1 nu of the components measured, (steps,)."""
-    innovation, _, F, _ = without_missing(value, np.zeros_like(F), F, F)
-    return normalised_square(innovation, F)
 
 
 def _below(degrees: Array, edge: float) -> tuple[Array, Array]:
