@@ -57,8 +57,8 @@ Y = np.zeros(3)
         ),
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
         (
-            lambda: design([FILTER], Ensemble(MODEL, 10, 2, 1)),
-            r"^design expects a Design, got Filter",
+            lambda: design([MODEL], Ensemble(MODEL, 10, 2, 1)),
+            r"^design expects a Design, got Model",
         ),
         (
             lambda: compare([FILTER, MODEL], MODEL, 10, 2, 1),

@@ -29,7 +29,8 @@ HEAVY = 0.1  # part of D_k that a single trajectory makes where the filter diver
 # of the bound: standard error at least of what is said of a single step, as rare trajectories carry
 # what is smaller
 RESOLUTION = 5e-4
-ALIKE = 1e-10  # of D_k: filters that differ by less coincide but for rounding
+# of D_k: filters that differ by less coincide, as half of their digits may be lost on the way
+ALIKE = 1e-8
 
 
 class Verdict(NamedTuple):
@@ -254,13 +255,13 @@ class Comparison:
         )
         return [[self.entrants[i] for i in column] for column in order.T]
 
-    def leaders(self, step: int, confidence: float = CONFIDENCE) -> list[str]:
+    def leaders(self, step: int) -> list[str]:
         """The most accurate entrant at a step, then those that are not significantly worse, each by
         its own paired interval."""
         best, *others = self._ranked[step]
         return [
             best,
-            *(name for name in others if self._p_value(name, best)[step] > 1 - confidence),
+            *(name for name in others if self._p_value(name, best)[step] > 1 - CONFIDENCE),
         ]
 
     def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:

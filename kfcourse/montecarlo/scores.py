@@ -15,15 +15,15 @@ and others, Q. J. R. Meteorol. Soc. 132 (2006).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import ndtr
 
 from kfcourse.angles import Components, difference
 from kfcourse.filters.base import Filter, State
 from kfcourse.laws import Array, log_density
-from kfcourse.montecarlo.ensemble import foretold
-from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.model import Model
+from kfcourse.montecarlo.ensemble import Ensemble, foretold
 from kfcourse.symbolic.structure import Structure
 
 DRAWS = 16  # of what is neither a normal law nor a mixture: they widen the interval by 4 %
@@ -35,16 +35,14 @@ def scored(
     before: State,
     y: Array,
     after: State,
-    model: Model | JumpModel,
-    seed: np.random.SeedSequence,
+    batch: Ensemble,
 ) -> tuple[Array, Array]:
     """Both scores of the measurement y (runs, p) for each trajectory, (runs,), by the filter's own
-    structural functions, or these; NaN for the second where the prediction cannot be had."""
+    structural functions, or these; NaN for the second where the prediction cannot be had.  The
+    batch, the first of several, gives what is drawn a seed."""
     log = chosen.evidence(before, y, after) if chosen.evidence else None
     if chosen.drawn is not None:
-        key = (*seed.spawn_key, 1, before.step)
-        rng = np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=key))
-        return log, crps_of_draws(y, _expected(chosen, before, model, rng), model.angles.y)
+        return log, crps_of_draws(y, _expected(chosen, before, batch), batch.model.angles.y)
     if chosen.mixture is not None:
         weights, laws = chosen.mixture(before)
     elif log is not None:
@@ -59,16 +57,16 @@ def scored(
     return log, crps(errors, deviations, weights[:, None]).sum(axis=-1)
 
 
-def _expected(
-    chosen: Filter, before: State, model: Model | JumpModel, rng: np.random.Generator
-) -> Array:
+def _expected(chosen: Filter, before: State, batch: Ensemble) -> Array:
     """Measurements drawn from what a filter expects, (DRAWS, runs, p)."""
-    shape = DRAWS, len(before.posterior.mean)
+    runs, key = len(before.posterior.mean), (*batch.seed.spawn_key, 1, before.step)
+    seed = np.random.SeedSequence(batch.seed.entropy, spawn_key=key)
     drawn = None
     if before.step > 0:
-        x, mode = chosen.drawn(before, DRAWS, rng)
+        x, mode = chosen.drawn(before, DRAWS, np.random.default_rng(seed))  # type: ignore[misc]
         drawn = x.reshape(-1, x.shape[-1]), mode.ravel()
-    return foretold(model, before.step, drawn, rng, DRAWS * shape[1]).reshape(*shape, -1)
+    y = foretold(replace(batch, runs=DRAWS * runs, seed=seed, wide=None), before.step, drawn)
+    return y.reshape(DRAWS, runs, -1)
 
 
 def crps_of_draws(y: Array, drawn: Array, angles: Components) -> Array:
