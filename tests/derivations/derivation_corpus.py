@@ -16,8 +16,6 @@ value.  The lines after it are either rewritten from the line with the slip (rig
 from the right one.
 """
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -99,7 +97,9 @@ def typed(line: Node, rng: random.Random) -> str:
 def chains(seed: int, count: int) -> list[Chain]:
     """Right chains of the shipped variants, in turn."""
     rng, made = random.Random(seed), []
-    wanted = [pair for name, one in load_variants().items() for pair in functions(name, one.model)]
+    wanted = [
+        pair for name, variant in load_variants().items() for pair in functions(name, variant.model)
+    ]
     rng.shuffle(wanted)
     for variant, function in (wanted * count)[:count]:
         model = load_variants()[variant].model
@@ -107,11 +107,11 @@ def chains(seed: int, count: int) -> list[Chain]:
         law = None if law and set(law) & set(model.parameters) else law
         mean, cov = law or (("z", "p") if function[0] in "tT" else ("m", "d"))
         formulas, moments = staged(variant, function, mean, cov)
-        lines = [read_line(str(one)) for one in formulas]
+        lines = [read_line(str(formula)) for formula in formulas]
         if function != "K":
             # implicit steps
-            lines[2:] = [one for one in lines[2:] if rng.random() < 0.85] or lines[-1:]
-        rewritten = tuple(_rewritten(one, rng, rng.randint(0, 3)) for one in lines)
+            lines[2:] = [line for line in lines[2:] if rng.random() < 0.85] or lines[-1:]
+        rewritten = tuple(_rewritten(line, rng, rng.randint(0, 3)) for line in lines)
         noises = model.v if function[0] in "tT" else model.w
         made.append(Chain(variant, law, name_of(function, model), rewritten, moments, noises))
     return made
@@ -157,9 +157,9 @@ def staged(
 def _rewritten(node: Node, rng: random.Random, times: int) -> Node:
     """The tree after some rules of algebra in random places."""
     for _ in range(times):
-        path, one = rng.choice(list(walk(node)))
+        path, part = rng.choice(list(walk(node)))
         rule = rng.choice(RULES)
-        new = rule(one, rng)
+        new = rule(part, rng)
         if new is not None and _size(node) < 150:
             node = read_line(written(changed(node, path, new)))
     return read_line(written(node))
@@ -257,7 +257,7 @@ def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
         while not _there(new, where):  # brackets that are no longer needed are gone
             where = where[:-1]
         follows = rng.random() < 0.5
-        rest = [_rewritten(new if follows else one, rng, 2) for one in chain.lines[i + 1 :]]
+        rest = [_rewritten(new if follows else after, rng, 2) for after in chain.lines[i + 1 :]]
         return Planted(
             replace(chain, lines=(*chain.lines[:i], new, *rest)),
             i,
@@ -405,13 +405,13 @@ def mean_of(moments: GaussianMoments, formula: sp.Expr) -> sp.Expr:
 
 
 def differs_formula(chain: Chain, node: Node, formula: sp.Expr) -> bool:
-    if any(one.kind == MEAN for _, one in walk(node)):
+    if any(part.kind == MEAN for _, part in walk(node)):
         return True
     return not _same(formula_of(node, chain.moments), formula)
 
 
 def differs(chain: Chain, first: Node, second: Node) -> bool:
-    return not _same(*(formula_of(one, chain.moments) for one in (first, second)))
+    return not _same(*(formula_of(line, chain.moments) for line in (first, second)))
 
 
 def _same(first: sp.Expr, second: sp.Expr) -> bool:
@@ -420,7 +420,7 @@ def _same(first: sp.Expr, second: sp.Expr) -> bool:
     for k in range(3):
         source = random.Random(k)
         point = {s: sp.Rational(source.randint(101, 397), source.randint(101, 397)) for s in names}
-        a, b = (sp.N(one.xreplace(point), 30) for one in (first, second))
+        a, b = (sp.N(formula.xreplace(point), 30) for formula in (first, second))
         if not abs(a - b) <= sp.Float("1e-20") * (1 + abs(b)):
             return False
     return True
