@@ -244,11 +244,11 @@ def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
     rng.shuffle(places)
     for i, path, node in places:
         line = chain.lines[i]
-        made = slip(line, path, node, rng, chain)
-        if made is None:
+        instead = slip(node, rng, line, chain)
+        if instead is None:
             continue
-        where, new = made
-        new = read_line(written(new))
+        where = path if node.kind == SUM else _term(line, path)
+        new = read_line(written(changed(line, path, instead)))
         try:
             if not differs(chain, line, new):
                 continue
@@ -283,44 +283,33 @@ def _term(line: Node, path: Path) -> Path:
     return ()
 
 
-def _sign(line, path, node, rng, chain):
-    if node.kind != SUM:
-        return None
-    i = rng.randrange(len(node.parts))
-    data = tuple(-sign if i == j else sign for j, sign in enumerate(node.data))
-    return (*path, i), changed(line, path, replace(node, data=data))
+# Each gives what takes the place of a node, or None where it cannot be made.
 
 
-def _number(line, path, node, rng, chain):
+def _sign(node, rng, line, chain):
+    return None if node.kind == SUM else total(node, signs=(-1,))
+
+
+def _number(node, rng, line, chain):
     if node.kind == NUMBER:
-        return _term(line, path), changed(
-            line, path, number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2)
-        )
+        return number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2)
     if node.kind == PRODUCT:
-        return _term(line, path), changed(
-            line, path, product(number(rng.choice((2, 3, Fraction(1, 2)))), node)
-        )
+        return product(number(rng.choice((2, 3, Fraction(1, 2)))), node)
     return None
 
 
-def _power(line, path, node, rng, chain):
+def _power(node, rng, line, chain):
     if node.kind != POWER or node.data.denominator != 1 or node.data < 1:
         return None
-    return _term(line, path), changed(
-        line, path, power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data]))
-    )
+    return power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data]))
 
 
-def _letter(line, path, node, rng, chain):
-    if node.kind != LETTER:
-        return None
-    others = sorted(letters(line) - {node.data})
-    if not others:
-        return None
-    return _term(line, path), changed(line, path, Node(LETTER, data=rng.choice(others)))
+def _letter(node, rng, line, chain):
+    others = sorted(letters(line) - {node.data}) if node.kind == LETTER else []
+    return Node(LETTER, data=rng.choice(others)) if others else None
 
 
-def _lost_factor(line, path, node, rng, chain):
+def _lost_factor(node, rng, line, chain):
     if node.kind != PRODUCT or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
@@ -328,51 +317,46 @@ def _lost_factor(line, path, node, rng, chain):
         node.parts[i].parts and node.parts[i].parts[0].kind != LETTER
     ):
         return None
-    return _term(line, path), changed(line, (*path, i), number(1))
+    return changed(node, (i,), number(1))
 
 
-def _without(line, path, i):
-    """The line without the term number `i` of the sum at `path`."""
-    parent = at(line, path)
-    keep = [j for j in range(len(parent.parts)) if j != i]
-    terms, signs = ([values[j] for j in keep] for values in (parent.parts, parent.data))
-    return path, changed(line, path, Node(SUM, tuple(terms), tuple(signs)))
+def _without(node, i):
+    """A sum without its term number i."""
+    terms, signs = (values[:i] + values[i + 1 :] for values in (node.parts, node.data))
+    return Node(SUM, terms, signs)
 
 
-def _lost_term(line, path, node, rng, chain):
+def _lost_term(node, rng, line, chain):
     if node.kind != SUM or len(node.parts) < 2:
         return None
-    return _without(line, path, rng.randrange(len(node.parts)))
+    return _without(node, rng.randrange(len(node.parts)))
 
 
-def _twice(line, path, node, rng, chain):
+def _twice(node, rng, line, chain):
     if node.kind != SUM or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
-    return path, changed(
-        line, path, Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i]))
-    )
+    return Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i]))
 
 
-def _moment(line, path, node, rng, chain):
+def _moment(node, rng, line, chain):
     """Put 3 d^2, or the fourth power of the mean, in the place of a fourth moment that is computed
     in this line."""
     mean, cov = chain.moments.mean[0], chain.moments.cov[0, 0]
     if node.kind != SUM or differs_formula(chain, node, mean**4 + 6 * mean**2 * cov + 3 * cov**2):
         return None
-    return _term(line, path), changed(
-        line, path, read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2))))
-    )
+    return read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2))))
 
 
-def _noise(line, path, node, rng, chain):
+def _noise(node, rng, line, chain):
     """Forget the mean square of the noise: without the mean of w^2, what it multiplies is gone."""
-    if node.kind != MEAN or not any(s.name in letters(node) for s in chain.noises):
+    if node.kind != SUM or len(node.parts) < 2:
         return None
-    term = _term(line, path)
-    if not term or len(at(line, term[:-1]).parts) < 2:
-        return None
-    return _without(line, term[:-1], term[-1])
+    noises = {noise.name for noise in chain.noises}
+    for i, term in enumerate(node.parts):
+        if any(part.kind == MEAN and noises & letters(part) for _, part in walk(term)):
+            return _without(node, i)
+    return None
 
 
 SLIPS = (_sign, _number, _power, _letter, _lost_factor, _lost_term, _twice, _moment, _noise)

@@ -44,7 +44,7 @@ def test_right_chains_are_accepted_and_slips_named_by_their_term(seed, monkeypat
         assert report.right, f"{text}\n\n{report}"
     slips = planted(made, seed)
     # a short chain may have no place for a slip
-    assert len(slips) >= 0.8 * COUNT and len({slip.kind for slip in slips}) > 5
+    assert len(slips) >= 0.8 * COUNT and len({slip.kind for slip in slips}) > 4
     for slip in slips:
         text = slip.chain.text(rng)
         report = check_text(text, find)

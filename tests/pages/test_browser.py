@@ -2,14 +2,14 @@
 filter, statistics."""
 
 import json
-from functools import cache
+from dataclasses import replace
 
 import answering
 import numpy as np
 import pytest
 from weekly import weekly
 
-from kfcourse import Model, compare, run
+from kfcourse import Model, compare, run, simulate
 from kfcourse.filters import pointmass
 from kfcourse.lab import lab_filters
 from kfcourse.lab.short_names import LAB
@@ -60,7 +60,6 @@ def array(values) -> np.ndarray:
 # ---------------------------------------------------------------- filters
 
 
-@cache
 def drawn(id: str) -> list[dict[str, np.ndarray]]:
     """Standard normal draws of two ensembles, the one for designing and the one for running; and
     their trajectories."""
@@ -135,20 +134,17 @@ def test_the_exact_filter_is_the_package_s(page, id):
     """Means within a hundredth of the posterior deviation and variances within 3 %, at the worst of
     steps; on average the means add 1e-5 to the bound and the variances 1e-3: a tenth of a percent,
     far below what some hundred trajectories can tell."""
-    model, rng, runs, steps = SCALAR[id], np.random.default_rng(5), 16, 12
-    state, meter = compile_model(model)
-    start = rng.standard_normal(runs) * np.tile([1, 2], runs // 2)
-    x, y = (model.prior.mean[0] + np.sqrt(model.prior.cov[0, 0]) * start)[:, None], []
-    for _ in range(steps):
-        y.append(meter(x, rng.standard_normal((runs, len(model.w)))))
-        x = state(x, rng.standard_normal((runs, len(model.v))))
+    model = SCALAR[id]
+    # twice as far out as the prior has them
+    wide = replace(model, prior=model.prior._replace(cov=4 * model.prior.cov))
+    y = simulate(wide, 16, 12, seed=5).y
     body = (
         SETTINGS
         + "return y.map(record => { const { z, p } = kfLab.exact(model, settings, record); return [z, "
         "p]; });"
     )
-    result = array(computed(page, body, {"id": id, "y": np.stack(y)[..., 0].T.tolist()}))
-    law = run(pointmass(model), np.stack(y))
+    result = array(computed(page, body, {"id": id, "y": y[..., 0].T.tolist()}))
+    law = run(pointmass(model), y)
     mean, variance = law.mean[..., 0].T, law.cov[..., 0, 0].T
     off = np.abs(result[:, 0] - mean) / np.sqrt(variance)
     assert off.max() < 0.01 and (off**2).mean() < 1e-5
@@ -183,12 +179,14 @@ def test_intervals_above_the_bound_cover(page, id):
     are its own, so this compares these, too.
     """
     model = SCALAR[id]
-    result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1)
+    package = compare(
+        lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1
+    )
     result = np.array(
         [array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)]
     )
     ratio, error, bound = np.moveaxis(result, -1, 0)
-    gaps = [result.gap(name) for name in ("aof-linearised", "aof-gaussian")]
+    gaps = [package.gap(name) for name in ("aof-linearised", "aof-gaussian")]
     value, own = (
         np.array([getattr(gap, part) for gap in gaps]) for part in ("value", "standard_error")
     )
@@ -198,6 +196,6 @@ def test_intervals_above_the_bound_cover(page, id):
     assert (
         np.abs(ratio.mean(axis=0) - value) < 4 * np.hypot(ratio.std(axis=0) / np.sqrt(40), own)
     ).all()
-    expected = result.bound()
+    expected = package.bound()
     spread = np.hypot(bound.std(axis=0) / np.sqrt(40), expected.standard_error)
     assert (np.abs(bound.mean(axis=0) - expected.value) < 4 * spread).all()

@@ -349,16 +349,16 @@ def test_its_file_is_a_record_of_the_chapter_s_model(opened, tmp_path):
     assert 0.25 < np.isnan(y).all(axis=-1).mean() < 0.35
 
 
-# ---------------------------------------------------------------- by mouse
+# ---------------------------------------------------------------- by mouse and finger
 
 
-def circle(tab, seconds: float) -> None:
-    """Move the mouse once round the middle of the field, at the rate of a screen."""
+def circle(tab, move, seconds: float) -> None:
+    """Move once round the middle of the field, at the rate of a screen."""
     box = tab.locator("canvas").bounding_box()
     for angle in np.linspace(0, 2 * np.pi, round(seconds / 0.016)):
         x = box["x"] + box["width"] / 2 + 0.3 * box["height"] * np.cos(angle)
         y = box["y"] + box["height"] / 2 + 0.3 * box["height"] * np.sin(angle)
-        tab.mouse.move(x, y)
+        move(x, y)
         tab.clock.run_for(16)
 
 
@@ -366,7 +366,7 @@ def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     tab = opened()
     tab.mouse.move(5, 5)
     assert text(tab, "count") == INTRODUCED
-    circle(tab, 2.0)
+    circle(tab, tab.mouse.move, 2.0)
     assert text(tab, "phase") == "ready" and status(tab) == "The filter is ready."
     tab.mouse.move(5, 5)
     count, seconds = re.fullmatch(r"(\d+) in (\d+\.\d\d) s", text(tab, "count")).groups()
@@ -379,7 +379,21 @@ def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     assert text(tab, "count") == f"{count} in {seconds} s"  # ended when the mouse left
     press(tab, "Clear")
     assert text(tab, "count") == "–"
-    # nor does a finger scroll
-    assert (
-        tab.locator("canvas").evaluate("canvas => getComputedStyle(canvas).touchAction") == "none"
-    )
+
+
+@pytest.mark.slow
+def test_a_finger(opened):
+    """The browser does not take it for scrolling."""
+    tab = opened(has_touch=True, is_mobile=True, viewport={"width": 400, "height": 900})
+    session = tab.context.new_cdp_session(tab)
+
+    def touch(kind, *points):
+        touches = [{"x": x, "y": y} for x, y in points]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+
+    box = tab.locator("canvas").bounding_box()
+    touch("touchStart", (box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2))
+    circle(tab, lambda x, y: touch("touchMove", (x, y)), 2.0)
+    touch("touchEnd")
+    assert status(tab).startswith("Your track, ") and is_cleaner(tab)
+    assert tab.evaluate("[scrollX, scrollY]") == [0, 0]
