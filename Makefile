@@ -27,7 +27,7 @@ help:
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
-	@echo "make fuzz        20,000 generated formulas, models and files of variants; 1,000 are part of make unit"
+	@echo "make fuzz        20,000 generated formulas, models and files of variants; 300 are part of make unit"
 	@echo "make benchmark   speed of the engine, as ratios"
 	@echo "make literature  the figures of the literature beside ours"
 	@echo "make figure      the figure of README.md"

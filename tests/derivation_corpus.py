@@ -16,8 +16,6 @@ value.  The lines after it are either rewritten from the line with the slip (rig
 from the right one.
 """
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -99,7 +97,9 @@ def typed(line: Node, rng: random.Random) -> str:
 def chains(seed: int, count: int) -> list[Chain]:
     """Right chains of the shipped variants, in turn."""
     rng, made = random.Random(seed), []
-    wanted = [pair for name, one in load_variants().items() for pair in functions(name, one.model)]
+    wanted = [
+        pair for name, variant in load_variants().items() for pair in functions(name, variant.model)
+    ]
     rng.shuffle(wanted)
     for variant, function in (wanted * count)[:count]:
         model = load_variants()[variant].model
@@ -107,11 +107,11 @@ def chains(seed: int, count: int) -> list[Chain]:
         law = None if law and set(law) & set(model.parameters) else law
         mean, cov = law or (("z", "p") if function[0] in "tT" else ("m", "d"))
         formulas, moments = staged(variant, function, mean, cov)
-        lines = [read_line(str(one)) for one in formulas]
+        lines = [read_line(str(formula)) for formula in formulas]
         if function != "K":
             # implicit steps
-            lines[2:] = [one for one in lines[2:] if rng.random() < 0.85] or lines[-1:]
-        rewritten = tuple(_rewritten(one, rng, rng.randint(0, 3)) for one in lines)
+            lines[2:] = [line for line in lines[2:] if rng.random() < 0.85] or lines[-1:]
+        rewritten = tuple(_rewritten(line, rng, rng.randint(0, 3)) for line in lines)
         noises = model.v if function[0] in "tT" else model.w
         made.append(Chain(variant, law, name_of(function, model), rewritten, moments, noises))
     return made
@@ -157,9 +157,9 @@ def staged(
 def _rewritten(node: Node, rng: random.Random, times: int) -> Node:
     """The tree after some rules of algebra in random places."""
     for _ in range(times):
-        path, one = rng.choice(list(walk(node)))
+        path, part = rng.choice(list(walk(node)))
         rule = rng.choice(RULES)
-        new = rule(one, rng)
+        new = rule(part, rng)
         if new is not None and _size(node) < 150:
             node = read_line(written(changed(node, path, new)))
     return read_line(written(node))
@@ -244,11 +244,11 @@ def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
     rng.shuffle(places)
     for i, path, node in places:
         line = chain.lines[i]
-        made = slip(line, path, node, rng, chain)
-        if made is None:
+        instead = slip(node, rng, line, chain)
+        if instead is None:
             continue
-        where, new = made
-        new = read_line(written(new))
+        where = path if node.kind == SUM else _term(line, path)
+        new = read_line(written(changed(line, path, instead)))
         try:
             if not differs(chain, line, new):
                 continue
@@ -257,7 +257,7 @@ def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
         while not _there(new, where):  # brackets that are no longer needed are gone
             where = where[:-1]
         follows = rng.random() < 0.5
-        rest = [_rewritten(new if follows else one, rng, 2) for one in chain.lines[i + 1 :]]
+        rest = [_rewritten(new if follows else after, rng, 2) for after in chain.lines[i + 1 :]]
         return Planted(
             replace(chain, lines=(*chain.lines[:i], new, *rest)),
             i,
@@ -283,44 +283,33 @@ def _term(line: Node, path: Path) -> Path:
     return ()
 
 
-def _sign(line, path, node, rng, chain):
-    if node.kind != SUM:
-        return None
-    i = rng.randrange(len(node.parts))
-    data = tuple(-sign if i == j else sign for j, sign in enumerate(node.data))
-    return (*path, i), changed(line, path, replace(node, data=data))
+# Each gives what takes the place of a node, or None where it cannot be made.
 
 
-def _number(line, path, node, rng, chain):
+def _sign(node, rng, line, chain):
+    return None if node.kind == SUM else total(node, signs=(-1,))
+
+
+def _number(node, rng, line, chain):
     if node.kind == NUMBER:
-        return _term(line, path), changed(
-            line, path, number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2)
-        )
+        return number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2)
     if node.kind == PRODUCT:
-        return _term(line, path), changed(
-            line, path, product(number(rng.choice((2, 3, Fraction(1, 2)))), node)
-        )
+        return product(number(rng.choice((2, 3, Fraction(1, 2)))), node)
     return None
 
 
-def _power(line, path, node, rng, chain):
+def _power(node, rng, line, chain):
     if node.kind != POWER or node.data.denominator != 1 or node.data < 1:
         return None
-    return _term(line, path), changed(
-        line, path, power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data]))
-    )
+    return power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data]))
 
 
-def _letter(line, path, node, rng, chain):
-    if node.kind != LETTER:
-        return None
-    others = sorted(letters(line) - {node.data})
-    if not others:
-        return None
-    return _term(line, path), changed(line, path, Node(LETTER, data=rng.choice(others)))
+def _letter(node, rng, line, chain):
+    others = sorted(letters(line) - {node.data}) if node.kind == LETTER else []
+    return Node(LETTER, data=rng.choice(others)) if others else None
 
 
-def _lost_factor(line, path, node, rng, chain):
+def _lost_factor(node, rng, line, chain):
     if node.kind != PRODUCT or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
@@ -328,51 +317,46 @@ def _lost_factor(line, path, node, rng, chain):
         node.parts[i].parts and node.parts[i].parts[0].kind != LETTER
     ):
         return None
-    return _term(line, path), changed(line, (*path, i), number(1))
+    return changed(node, (i,), number(1))
 
 
-def _without(line, path, i):
-    """The line without the term number `i` of the sum at `path`."""
-    parent = at(line, path)
-    keep = [j for j in range(len(parent.parts)) if j != i]
-    terms, signs = ([values[j] for j in keep] for values in (parent.parts, parent.data))
-    return path, changed(line, path, Node(SUM, tuple(terms), tuple(signs)))
+def _without(node, i):
+    """A sum without its term number i."""
+    terms, signs = (values[:i] + values[i + 1 :] for values in (node.parts, node.data))
+    return Node(SUM, terms, signs)
 
 
-def _lost_term(line, path, node, rng, chain):
+def _lost_term(node, rng, line, chain):
     if node.kind != SUM or len(node.parts) < 2:
         return None
-    return _without(line, path, rng.randrange(len(node.parts)))
+    return _without(node, rng.randrange(len(node.parts)))
 
 
-def _twice(line, path, node, rng, chain):
+def _twice(node, rng, line, chain):
     if node.kind != SUM or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
-    return path, changed(
-        line, path, Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i]))
-    )
+    return Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i]))
 
 
-def _moment(line, path, node, rng, chain):
+def _moment(node, rng, line, chain):
     """Put 3 d^2, or the fourth power of the mean, in the place of a fourth moment that is computed
     in this line."""
     mean, cov = chain.moments.mean[0], chain.moments.cov[0, 0]
     if node.kind != SUM or differs_formula(chain, node, mean**4 + 6 * mean**2 * cov + 3 * cov**2):
         return None
-    return _term(line, path), changed(
-        line, path, read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2))))
-    )
+    return read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2))))
 
 
-def _noise(line, path, node, rng, chain):
+def _noise(node, rng, line, chain):
     """Forget the mean square of the noise: without the mean of w^2, what it multiplies is gone."""
-    if node.kind != MEAN or not any(s.name in letters(node) for s in chain.noises):
+    if node.kind != SUM or len(node.parts) < 2:
         return None
-    term = _term(line, path)
-    if not term or len(at(line, term[:-1]).parts) < 2:
-        return None
-    return _without(line, term[:-1], term[-1])
+    noises = {noise.name for noise in chain.noises}
+    for i, term in enumerate(node.parts):
+        if any(part.kind == MEAN and noises & letters(part) for _, part in walk(term)):
+            return _without(node, i)
+    return None
 
 
 SLIPS = (_sign, _number, _power, _letter, _lost_factor, _lost_term, _twice, _moment, _noise)
@@ -405,13 +389,13 @@ def mean_of(moments: GaussianMoments, formula: sp.Expr) -> sp.Expr:
 
 
 def differs_formula(chain: Chain, node: Node, formula: sp.Expr) -> bool:
-    if any(one.kind == MEAN for _, one in walk(node)):
+    if any(part.kind == MEAN for _, part in walk(node)):
         return True
     return not _same(formula_of(node, chain.moments), formula)
 
 
 def differs(chain: Chain, first: Node, second: Node) -> bool:
-    return not _same(*(formula_of(one, chain.moments) for one in (first, second)))
+    return not _same(*(formula_of(line, chain.moments) for line in (first, second)))
 
 
 def _same(first: sp.Expr, second: sp.Expr) -> bool:
@@ -420,7 +404,7 @@ def _same(first: sp.Expr, second: sp.Expr) -> bool:
     for k in range(3):
         source = random.Random(k)
         point = {s: sp.Rational(source.randint(101, 397), source.randint(101, 397)) for s in names}
-        a, b = (sp.N(one.xreplace(point), 30) for one in (first, second))
+        a, b = (sp.N(formula.xreplace(point), 30) for formula in (first, second))
         if not abs(a - b) <= sp.Float("1e-20") * (1 + abs(b)):
             return False
     return True

@@ -4,8 +4,6 @@
 these tests.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import re
@@ -64,14 +62,14 @@ class Resources(HTMLParser):
 
     def __init__(self) -> None:
         super().__init__()
-        self.found: list[str] = []
+        self.loads: list[str] = []
         self.opened: list[str] = []
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         named = dict(attributes)
         address, link = named.get(LOADS.get(tag, "")), named.get("rel") if tag == "link" else None
         if address and link not in ("canonical", "license"):
-            self.found.append(address)
+            self.loads.append(address)
             if link in (None, "stylesheet", "icon") and named.get("loading") != "lazy":
                 self.opened.append(address)
 
@@ -84,8 +82,8 @@ def loaded(page: str) -> Resources:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_page_exists_and_loads_only_local_files(page: str) -> None:
-    matched = loaded(page).found
+def test_page_exists_and_loads_only_local_files(page: str):
+    matched = loaded(page).loads
     assert matched, "no style sheet and no script: not a page of this book"
     for address in matched:
         if address.startswith("data:"):
@@ -96,7 +94,7 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
         )
 
 
-def test_style_sheets_load_only_local_files() -> None:
+def test_style_sheets_load_only_local_files():
     for sheet in (HTML / "_static").rglob("*.css"):
         assert not re.search(
             r"(@import\s+|url\()\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")
@@ -112,7 +110,7 @@ def test_an_old_address_leads_on(old: str, new: str) -> None:
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS)
-def test_notebook_is_executed_without_errors(page: str) -> None:
+def test_notebook_is_executed_without_errors(page: str):
     notebook = nbformat.read(EXECUTED / f"{page}.ipynb", as_version=4)
     cells = [cell for cell in notebook.cells if cell.cell_type == "code" and cell.source.strip()]
     assert cells
@@ -123,7 +121,7 @@ def test_notebook_is_executed_without_errors(page: str) -> None:
             assert output.output_type != "error" or allowed, f"{output.ename}: {output.evalue}"
 
 
-def test_no_notebook_is_left_out() -> None:
+def test_no_notebook_is_left_out():
     assert NOTEBOOKS
     assert {
         path.relative_to(EXECUTED).with_suffix("").as_posix() for path in EXECUTED.rglob("*.ipynb")
@@ -227,18 +225,18 @@ UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-out
     const all = document.createRange();
     return (shown ? [...shown.querySelectorAll(":scope > p, mjx-container > :first-child")] : []).filter((e) => {
       all.selectNodeContents(e);
-      return [...all.getClientRects()].some((one) => one.right > left && one.top < bottom - 2 && one.bottom > top + 2);
+      return [...all.getClientRects()].some((box) => box.right > left && box.top < bottom - 2 && box.bottom > top + 2);
     }).map((e) => e.textContent.slice(-60));
   })"""
 # Set formulas wider than their column, those in folds too.
 TOO_WIDE = """() => {
     const folds = [...document.querySelectorAll("article details:not([open])")];
     for (const fold of folds) fold.open = true;
-    const found = [...document.querySelectorAll("article div.math mjx-container")]
+    const wide = [...document.querySelectorAll("article div.math mjx-container")]
         .filter((e) => e.scrollWidth > e.clientWidth + 1)
         .map((e) => `${e.textContent.slice(0, 60)} (+${e.scrollWidth - e.clientWidth})`);
     for (const fold of folds) fold.open = false;
-    return found;
+    return wide;
 }"""
 # Figures in sight whose letters of 10 pt are smaller than 10 px.
 TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
@@ -249,10 +247,10 @@ LONGEST = 10_500
 # A sheet of A4 less its margins, in px of CSS.
 PAPER = 673
 AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
-FOUND = """async (context, rules) => {
+VIOLATIONS = """async (context, rules) => {
     const { violations } = await axe.run(context, { resultTypes: ["violations"], ...rules });
     const serious = violations.filter(({ impact }) => impact !== "minor");
-    return serious.flatMap(({ id, impact, nodes }) => nodes.map((one) => `${impact} ${id}: ${one.html.slice(0, 200)}`));
+    return serious.flatMap(({ id, impact, nodes }) => nodes.map((node) => `${impact} ${id}: ${node.html.slice(0, 200)}`));
 }"""
 # Thins out the page, as axe takes as long as there are elements: the insides of formulas, which
 # keep their size and have no text of their own, and spans that only colour code and signatures,
@@ -265,7 +263,7 @@ THIN = """(themes) => {
         e.replaceChildren();
     }
     const texts = [...document.body.querySelectorAll("*")]
-        .filter((e) => [...e.childNodes].some((one) => one.nodeType === Node.TEXT_NODE && one.data.trim()));
+        .filter((e) => [...e.childNodes].some((node) => node.nodeType === Node.TEXT_NODE && node.data.trim()));
     const looks = new Map(texts.map((e) => [e, ""]));
     for (const theme of themes) {
         document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
@@ -317,13 +315,13 @@ COLOURS = ["color-contrast", "link-in-text-block"]
 # has formulas and code of all kinds, and is looked at before it is thinned out, too
 WHOLE = "course/stratonovich"
 AUDIT = (
-    f"(colours) => ({FOUND})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, "
+    f"(colours) => ({VIOLATIONS})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, "
     f"{{ enabled: false }}])) }})"
 )
 CONTRAST = f"""([theme, colours]) => {{
     document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
     const include = [...document.querySelectorAll("[data-marked]")];
-    return include.length ? ({FOUND})({{ include }}, {{ runOnly: colours }}) : [];
+    return include.length ? ({VIOLATIONS})({{ include }}, {{ runOnly: colours }}) : [];
 }}"""
 
 
@@ -357,7 +355,7 @@ OTHERS = [
 
 
 @pytest.mark.parametrize("page", [*KINDS, *OTHERS])
-def test_page_in_a_browser_without_network(window, page: str) -> None:
+def test_page_in_a_browser_without_network(window, page: str):
     """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark;
     code is folded."""
     tab, problems = window

@@ -353,7 +353,10 @@ class Comparison:
 
     def _means(self, kind: str, name: str) -> Array:
         if name not in self.names:
-            raise KeyError(f"no results for {name!r}; this comparison has {', '.join(self.names)}")
+            why = f": {self.left_out[name]}" if name in self.left_out else ""
+            raise KeyError(
+                f"no results for {name!r}{why}; this comparison has {', '.join(self.names)}"
+            )
         return self.sums.means(kind)[self.names.index(name)]
 
     def _largest(self, name: str) -> Array:

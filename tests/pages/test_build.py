@@ -1,7 +1,5 @@
 """A book of which nothing has changed is not built again, any other is."""
 
-from __future__ import annotations
-
 import build
 import pytest
 

@@ -1,8 +1,6 @@
 """Every relation that a page types says what it is; numbers in claims and captions come from their
 cells."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The glossary: each term once, introduced by a page that there is, and what a page refers to on
 another page goes with it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

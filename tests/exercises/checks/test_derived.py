@@ -29,7 +29,7 @@ def opened(variant="53"):
     return exercise("a", variant)
 
 
-def told(*lines):
+def judged(*lines):
     task = opened()
     task.past.given.clear()
     return task.check("a7", lambda: "\n = ".join(lines))
@@ -54,7 +54,7 @@ SLIP = "g^2*d + 3*f^2*d^2"
 
 
 def test_line_term_and_rule_are_named_and_what_stands_on_top_is_right():
-    result = told(BEGIN, MIDDLE, SLIP, "d*(g^2 + 3*f^2*d)")
+    result = judged(BEGIN, MIDDLE, SLIP, "d*(g^2 + 3*f^2*d)")
     assert (result.status, result.diagnosis, result.share) == ("wrong", ("moment",), 0.75)
     for words in (
         f"line 3, `{SLIP}`",
@@ -68,7 +68,7 @@ def test_line_term_and_rule_are_named_and_what_stands_on_top_is_right():
     for part in ("6*m^2*d", "m^4", "6*d*m^2", "\n"):
         assert part not in result.message.replace(" ", "")
     # a second slip is named too, and costs another step
-    result = told(BEGIN, MIDDLE, SLIP, "d*(g^2 - 3*f^2*d)")
+    result = judged(BEGIN, MIDDLE, SLIP, "d*(g^2 - 3*f^2*d)")
     assert "slip of its own in line 4" in result.message and result.share == 0.5
 
 
@@ -85,7 +85,7 @@ def test_an_end_that_is_not_what_was_asked_for_does_not_pass(monkeypatch):
     monkeypatch.setattr(
         derived, "check_text", lambda text, find, _: check_text(text, find, setting)
     )
-    result = told(BEGIN, "g^2*d + 4*f^2*M[x^4]", "g^2*d + 4*f^2*(m^4 + 6*m^2*d + 3*d^2)")
+    result = judged(BEGIN, "g^2*d + 4*f^2*M[x^4]", "g^2*d + 4*f^2*(m^4 + 6*m^2*d + 3*d^2)")
     assert (result.status, result.diagnosis, result.share) == ("wrong", ("other-meaning",), 0.0)
 
 
@@ -101,8 +101,8 @@ def test_a_step_can_be_split_up_at_will_and_earns_no_more():
     padding = [f"M[(y - h)^2] + {k} - {k}" for k in range(9)]
     same = ["M[(y - h)^2]"] * 9
     for lines, share in (((*padding, "g^2*d"), 0.8), (padding, 0.4), ((*same, "g^2*d"), 0.5)):
-        assert told(BEGIN, *lines).share == share
-    nothing = told("F = F", "F + 0", "2*F/2")
+        assert judged(BEGIN, *lines).share == share
+    nothing = judged("F = F", "F + 0", "2*F/2")
     assert (nothing.diagnosis, nothing.share) == (("open-end",), 0.0)
     assert nothing.message.startswith("nothing is derived yet. The last line still has F in it")
 
@@ -127,23 +127,24 @@ def test_a_step_can_be_split_up_at_will_and_earns_no_more():
     ],
 )
 def test_a_right_end_is_not_all(kind, words, lines):
-    result = told(*lines)
+    result = judged(*lines)
     assert (result.status, result.diagnosis) == ("wrong", (kind,))
     assert words in result.message and 0 < result.share < 1
 
 
 def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
-    assert told("h = M[y]", "g*M[x]", f"g*m\n{BEGIN}", MIDDLE, END).passed
-    assert told(
+    assert judged("h = M[y]", "g*M[x]", f"g*m\n{BEGIN}", MIDDLE, END).passed
+    assert judged(
         f"letters q\nq = M[x^4]\n = m^4 + 6*m^2*d + 3*d^2\n{BEGIN}", "g^2*d + f^2*q", END
     ).passed
-    wrong = told(f"h = 0\n{BEGIN}", "M[y^2]", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2)")
+    wrong = judged(f"h = 0\n{BEGIN}", "M[y^2]", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2)")
     assert wrong.status == "wrong" and wrong.message.startswith(
         "line 1, `0`: the line differs from what h means"
     )
     for name in ("x", "w", "m", "g"):
         assert (
-            f"`{name} =`, which has a meaning already" in told(f"{name} = 1\n{BEGIN}", END).message
+            f"`{name} =`, which has a meaning already"
+            in judged(f"{name} = 1\n{BEGIN}", END).message
         )
 
 

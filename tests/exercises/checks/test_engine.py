@@ -101,9 +101,9 @@ def test_right_for_some_inputs_only():
 def test_result_shows_itself_and_carries_its_data():
     result = outcome(SUM, lambda a, b: a + 2 * b)
     assert repr(result) == "✓ t1 a test: right"
-    told = {"question": "t1", "status": "passed", "diagnosis": [], "message": "right"}
-    told |= {"share": 1.0, "follows": []}
-    assert result._repr_mimebundle_() == {"text/plain": repr(result), MIME: told}
+    data = {"question": "t1", "status": "passed", "diagnosis": [], "message": "right"}
+    data |= {"share": 1.0, "follows": []}
+    assert result._repr_mimebundle_() == {"text/plain": repr(result), MIME: data}
     assert repr(outcome(SUM, lambda a, b: a)).startswith("✗ t1")
 
 

@@ -23,11 +23,11 @@ def carried(A, P):
 
 
 def filtered(y, gain):
-    z, found = 0 * y[0], []
-    for one in y:
-        z = 0.9 * z + gain * (one - 0.9 * z)
-        found.append(z)
-    return np.array(found)
+    z, estimates = 0 * y[0], []
+    for measured in y:
+        z = 0.9 * z + gain * (measured - 0.9 * z)
+        estimates.append(z)
+    return np.array(estimates)
 
 
 def of_many(right):

@@ -38,10 +38,10 @@ def test_the_case_of_a_run_is_the_first_that_is_wrong():
     question = asks(lambda y, m: y + m, [(y, 1.0)], axes=("step", "trajectory"))
 
     def wrong(y, m):
-        found = y + m
-        found[1:, 1, 0] = 77
-        found[2:] **= 2
-        return found
+        answer = y + m
+        answer[1:, 1, 0] = 77
+        answer[2:] **= 2
+        return answer
 
     message = outcome(question, wrong).message
     assert (
@@ -55,18 +55,18 @@ def test_the_same_wrong_answer_again_gets_a_stronger_hint():
     question = asks(lambda a, b: a + b, [(2.5, 1.5)], mistakes, advice="Think of b.")
     past = Attempts()
 
-    def told(answer):
+    def message_of(answer):
         return check(question, NOTHING, answer, past=past).message
 
-    assert told(lambda a, b: a - b) == "not right. the sign of b"
-    assert told(lambda a, b: -b + a) == "not right. the sign of b Think of b."
-    assert told(lambda a, b: -b + a).startswith(
+    assert message_of(lambda a, b: a - b) == "not right. the sign of b"
+    assert message_of(lambda a, b: -b + a) == "not right. the sign of b Think of b."
+    assert message_of(lambda a, b: -b + a).startswith(
         "not right. the sign of b Think of b. An example: for a = 2.5"
     )
-    assert told(lambda a, b: 2 * (a + b)) == "not right. It is twice what it should be."
-    assert told(lambda a, b: a - b) == "not right. the sign of b"
-    assert told(lambda a, b: a + b) == "right"
-    assert told(lambda a, b: a - b) == "not right. the sign of b"
+    assert message_of(lambda a, b: 2 * (a + b)) == "not right. It is twice what it should be."
+    assert message_of(lambda a, b: a - b) == "not right. the sign of b"
+    assert message_of(lambda a, b: a + b) == "right"
+    assert message_of(lambda a, b: a - b) == "not right. the sign of b"
 
 
 def single(a):
@@ -86,7 +86,8 @@ def named(name, key):
 
 
 QUESTIONS = {
-    one.name: one for one in (named("t1", single), named("t2", doubled), named("t3", three))
+    question.name: question
+    for question in (named("t1", single), named("t2", doubled), named("t3", three))
 }
 EXERCISE = about(questions=QUESTIONS)
 
@@ -164,9 +165,9 @@ def test_what_cannot_be_so_is_not_said(question, answer, unsaid):
 def test_an_example_of_a_step_shows_the_rows_beside_it() -> None:
     """An interval is the difference of two rows: from one alone nobody sees what is wrong."""
     times, wrong = np.array([5.0, 7.0, 8.0]), np.array([2.0, 1.0, 7.0])
-    said = shown(["times"], [times], wrong, np.array([2.0, 1.0, 1.0]), axes=("step",))
+    example = shown(["times"], [times], wrong, np.array([2.0, 1.0, 1.0]), axes=("step",))
     assert (
-        said
+        example
         == "An example, step 2 (counted from 0): for times[1:3] = [7, 8] your function gives 7."
     )
     assert "times[0:2] = [5, 7]" in shown(["times"], [times], wrong + 1, wrong, axes=("step",))

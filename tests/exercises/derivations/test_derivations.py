@@ -7,6 +7,7 @@ text, neither overlaps what was changed nor contains it.
 """
 
 import random
+from itertools import product
 
 import pytest
 import sympy as sp
@@ -21,7 +22,7 @@ from kfcourse.exercises.derivations.typed import read_line, tree_of
 from kfcourse.lab import find_variant, load_variants
 from kfcourse.symbolic.structure import gaussian, linearised
 
-COUNT = 16  # chains of each seed
+COUNT = 10  # chains of each seed
 NAMED = 0.9
 
 
@@ -43,36 +44,35 @@ def test_right_chains_are_accepted_and_slips_named_by_their_term(seed, monkeypat
         assert report.right, f"{text}\n\n{report}"
     slips = planted(made, seed)
     # a short chain may have no place for a slip
-    assert len(slips) >= 0.8 * COUNT and len({slip.kind for slip in slips}) > 5
+    assert len(slips) >= 0.8 * COUNT and len({slip.kind for slip in slips}) > 4
     for slip in slips:
         text = slip.chain.text(rng)
         report = check_text(text, find)
-        first, told = report.first, f"{slip.kind}: {text}\n\n{report}"
+        first, case = report.first, f"{slip.kind}: {text}\n\n{report}"
         place = text.count("\n") + 1 - len(slip.chain.lines) + 1 + slip.line
-        assert first is not None and first.line == place, told
+        assert first is not None and first.line == place, case
         start, end = at(read_line(first.text), slip.path).span
         if not first.kinds:
             unnamed.append(text)
         elif not any(a < end and start < b for a, b in first.spans):
-            elsewhere.append(told)
+            elsewhere.append(case)
         for verdict in report.verdicts:
             if verdict.line > place:
                 later += 1
                 alone = "right in itself" if verdict.line == place + 1 else "right"
-                assert verdict.status == ("follows" if slip.follows else alone), told
+                assert verdict.status == ("follows" if slip.follows else alone), case
     assert len(unnamed) <= (1 - NAMED) * COUNT, unnamed
-    # another single change may explain the line as well: one of the 96 of all seeds
+    # another single change may explain the line as well: one of the 60 of all seeds
     assert len(elsewhere) <= (seed == 1), elsewhere
     assert later > COUNT / 4
 
 
-@pytest.mark.parametrize("name", load_variants())
 @pytest.mark.parametrize(
-    ("kind", "structure"), [("gaussian", gaussian), ("linearised", linearised)]
+    ("name", "structure"), weekly(product(load_variants(), [gaussian, linearised]))
 )
-def test_names_mean_the_package_s_structural_functions(name, kind, structure):
+def test_names_mean_the_package_s_structural_functions(name, structure):
     model = find(name)
-    setting, formulas = of_model(model, kind), structure(model)
+    setting, formulas = of_model(model, structure.__name__), structure(model)
     compared = 0
     for function in ("tau", "Theta", "h", "G", "F"):
         matrix = sp.Matrix([formulas[function]])
@@ -112,26 +112,26 @@ def verdict_of(text: str):
 
 
 @pytest.mark.parametrize(
-    ("line", "kind", "term", "rule"),
+    ("line", "kind", "term"),
     [
-        ("g^2*d + f^2*(m^4 - 6*m^2*d + 3*d^2)", "sign", "6*m^2*d", "normal law"),
-        ("g^2*d + f^2*(m^4 + 3*m^2*d + 3*d^2)", "factor", "3*m^2*d", "normal law"),
-        ("g*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "power", "g*d", "normal law"),
-        ("d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "lost-factor", "d", "normal law"),
-        ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "f^2*(m^4 + 3*d^2)", "normal law"),
-        ("g^2*m + f^2*(m^4 + 6*m^2*d + 3*d^2)", "letter", "g^2*m", "normal law"),
-        ("g^2*d + g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "doubled", "g^2*d", "normal law"),
-        ("g^2*d + f^2*3*d^2", "moment", "f^2*3*d^2", "normal law"),
-        ("g^2*d + f^2*(m^2 + d)^2", "moment", "f^2*(m^2 + d)^2", "normal law"),
+        ("g^2*d + f^2*(m^4 - 6*m^2*d + 3*d^2)", "sign", "6*m^2*d"),
+        ("g^2*d + f^2*(m^4 + 3*m^2*d + 3*d^2)", "factor", "3*m^2*d"),
+        ("g*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "power", "g*d"),
+        ("d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "lost-factor", "d"),
+        ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "f^2*(m^4 + 3*d^2)"),
+        ("g^2*m + f^2*(m^4 + 6*m^2*d + 3*d^2)", "letter", "g^2*m"),
+        ("g^2*d + g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "doubled", "g^2*d"),
+        ("g^2*d + f^2*3*d^2", "moment", "f^2*3*d^2"),
+        ("g^2*d + f^2*(m^2 + d)^2", "moment", "f^2*(m^2 + d)^2"),
         # no one term has it
-        ("g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2", "moment", "f^2*M[x^4]", "normal law"),
-        ("g^2*d", "lost", "g^2*d", "normal law"),
+        ("g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2", "moment", "f^2*M[x^4]"),
+        ("g^2*d", "lost", "g^2*d"),
     ],
 )
-def test_a_slip_is_named_by_kind_term_and_rule(line, kind, term, rule):
-    found = verdict_of(HEAD + STEP + line)
-    assert (found.status, found.kinds, found.terms) == ("differs", (kind,), (term,))
-    assert rule in found.rule
+def test_a_slip_is_named_by_kind_term_and_rule(line, kind, term):
+    verdict = verdict_of(HEAD + STEP + line)
+    assert (verdict.status, verdict.kinds, verdict.terms) == ("differs", (kind,), (term,))
+    assert "normal law" in verdict.rule
 
 
 @pytest.mark.parametrize(
@@ -145,10 +145,10 @@ def test_a_slip_is_named_by_kind_term_and_rule(line, kind, term, rule):
 def test_of_a_first_line_the_definition_is_the_hint_and_nothing_of_the_key_is_shown(
     line, kind, term
 ):
-    found = verdict_of(f"{HEAD}F = {line}")
-    assert (found.kinds, found.terms) == ((kind,), (term,))
-    assert found.rule.startswith("F is the mean square")
-    assert "g*m" not in found.says
+    verdict = verdict_of(f"{HEAD}F = {line}")
+    assert (verdict.kinds, verdict.terms) == ((kind,), (term,))
+    assert verdict.rule.startswith("F is the mean square")
+    assert "g*m" not in verdict.says
 
 
 @pytest.mark.parametrize(
@@ -184,8 +184,8 @@ def test_a_noise_forgotten_and_a_noise_of_mean_one():
     cross = verdict_of(start + "g^2*M[(x-m)^2] + 2*g*f*M[(x-m)*x^2] + f^2*M[x^4]")
     # with w its mean is zero
     assert (cross.kinds, cross.terms) == (("lost-factor",), ("2*g*f*M[(x-m)*x^2]",))
-    for found in (verdict_of(start + "g^2*M[(x-m)^2]"), cross):
-        assert "M[w^2] = 1" in found.rule
+    for verdict in (verdict_of(start + "g^2*M[(x-m)^2]"), cross):
+        assert "M[w^2] = 1" in verdict.rule
 
 
 def test_what_was_derived_wrongly_is_gone_on_with():
@@ -193,7 +193,7 @@ def test_what_was_derived_wrongly_is_gone_on_with():
         f"{HEAD}h = M[g*x + f*x^2*w]\n = g*M[x] + f*M[x^2]\n = g*m + f*(m^2 + d)\n\nF = M[(g*x "
         f"+ f*x^2*w - g*m - f*(m^2+d))^2]"
     )
-    assert [one.status for one in check_text(text, find).verdicts] == [
+    assert [verdict.status for verdict in check_text(text, find).verdicts] == [
         "right",
         "differs",
         "follows",
@@ -204,7 +204,12 @@ def test_what_was_derived_wrongly_is_gone_on_with():
 def test_without_a_model_letters_are_free_and_a_gain_is_a_quotient():
     text = "K = Psi*G/(G^2*Psi + R)\n = G/(G^2 + R/Psi)\n = 1/(G + R/(Psi*G))\n = 1/(G + R*G/Psi)"
     report = check_text(text, None)
-    assert [one.status for one in report.verdicts] == ["begins", "right", "right", "differs"]
+    assert [verdict.status for verdict in report.verdicts] == [
+        "begins",
+        "right",
+        "right",
+        "differs",
+    ]
     assert report.first.kinds == ("power",)
     assert report.first.terms == ("R*G/Psi",)
 
@@ -238,9 +243,9 @@ def test_positive_is_declared_and_not_guessed():
     ],
 )
 def test_what_cannot_be_read_is_marked_in_words(line, says):
-    found = check_text(f"{HEAD}h = g*m\n  = {line}\n  = m*g", find).verdicts
-    assert [one.status for one in found] == ["right", "unreadable", "right"]
-    assert says in found[1].says
+    verdicts = check_text(f"{HEAD}h = g*m\n  = {line}\n  = m*g", find).verdicts
+    assert [verdict.status for verdict in verdicts] == ["right", "unreadable", "right"]
+    assert says in verdicts[1].says
 
 
 @pytest.mark.parametrize(
@@ -248,8 +253,8 @@ def test_what_cannot_be_read_is_marked_in_words(line, says):
     ["g*m/(m-m)", "M[abs(x)]", "M[1/x]", "M[exp(x^2)]", "M[x^0.5]", "log(-1-g^2)", "tan(1e16)"],
 )
 def test_what_has_no_value_here_is_said_and_not_judged(line):
-    found = check_text(f"{HEAD}h = g*m\n  = {line}\n  = m*g", find).verdicts
-    assert [one.status for one in found] == ["right", "undecided", "right"]
+    verdicts = check_text(f"{HEAD}h = g*m\n  = {line}\n  = m*g", find).verdicts
+    assert [verdict.status for verdict in verdicts] == ["right", "undecided", "right"]
 
 
 @pytest.mark.parametrize(
@@ -266,8 +271,8 @@ def test_what_is_derived_in_a_circle_is_not_gone_round(text, right):
 
 def test_long_products_are_compared_by_value_and_in_time():
     many = "*".join(f"(c+{k}*e+g+f+m+d+x)" for k in range(1, 9))
-    found = check_text(f"variant 53\nS = {many}\n = {many[::1]}\n = 2*{many}", find).verdicts
-    assert [one.status for one in found] == ["begins", "right", "differs"]
+    verdicts = check_text(f"variant 53\nS = {many}\n = {many[::1]}\n = 2*{many}", find).verdicts
+    assert [verdict.status for verdict in verdicts] == ["begins", "right", "differs"]
 
 
 def test_a_tree_is_written_as_it_can_be_read():
