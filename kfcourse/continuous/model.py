@@ -12,7 +12,7 @@ import sympy as sp
 
 from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.codegen import Entries, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
@@ -259,15 +259,13 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
 
 
 def compiled(
-    model: ContinuousModel, arguments: dict[str, Any], outputs: dict[str, Any], vectors: list[str]
+    model: ContinuousModel, arguments: dict[str, Entries], outputs: dict[str, Entries]
 ) -> Callable[..., Any]:
     """The generated function of the time and these arguments."""
-    numeric = {
-        name: sp.ImmutableMatrix(matrix.subs(model.values)) for name, matrix in outputs.items()
-    }
+    numeric = {name: sp.Array(entries).subs(model.values) for name, entries in outputs.items()}
     if model.time is not None:
-        arguments = {**arguments, "t": sp.Matrix([model.time])}
-    function = compile_function("continuous", arguments, numeric, [*vectors, "t"]).function
+        arguments = {**arguments, "t": [model.time]}
+    function = compile_function("continuous", arguments, numeric).function
     return (
         (lambda t, *arrays: function(*arrays))
         if model.time is None

@@ -130,16 +130,10 @@ class Between:
         dx = a dt + B dw, then x' = x + (a(x, t) + a(x + dx, t + dt)) dt / 2 + B(x, t) dw: of strong
         order 1 and weak order 2 if B is constant, 1/2 and 1 if it depends on x.
         """
-        arguments = {"x": sp.Matrix(model.x), "known": sp.Matrix(model.known.symbols)}
-        drift, diffusion = (
-            compile_function(
-                "motion", arguments, {"rate": part.subs(model.values)}, vectors
-            ).function
-            for part, vectors in (
-                (self.drift, ["x", "known", "rate"]),
-                (self.diffusion, ["x", "known"]),
-            )
-        )
+        a, B = (part.subs(model.values) for part in (self.drift, self.diffusion))
+        arguments = {"x": model.x, "known": model.known.symbols}
+        drift = compile_function("drift", arguments, {"a": list(a)}).function
+        diffusion = compile_function("diffusion", arguments, {"B": B}).function
 
         def motion(x: Array, noise: Array, k: int | None = None) -> Array:
             span, now = clock(model.known, k or 0)

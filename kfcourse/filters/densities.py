@@ -179,9 +179,8 @@ def _law(
 
 
 def _compiled(model: Model, name: str, law: tuple[sp.MatrixBase, sp.MatrixBase]) -> Stepwise:
-    mean, cov = (part.subs(model.values) for part in law)
-    arguments, outputs = {"x": sp.Matrix(model.x)}, {"mean": mean, "cov": cov}
-    return Stepwise.compile(model.known, name, arguments, outputs, ["x", "mean"])
+    mean, cov = law
+    return model.compiled(name, {"x": model.x}, {"mean": list(mean), "cov": cov})
 
 
 def _singular(law: Stepwise, model: Model) -> bool:

@@ -33,16 +33,10 @@ CARTESIAN = sp.ImmutableMatrix(
 )
 
 _to_spherical = compile_function(
-    "spherical",
-    {"position": sp.Matrix([X, Y, Z])},
-    {"measured": SPHERICAL},
-    ["position", "measured"],
+    "spherical", {"position": [X, Y, Z]}, {"measured": list(SPHERICAL)}
 ).function
 _to_cartesian = compile_function(
-    "cartesian",
-    {"measured": sp.Matrix([RANGE, AZIMUTH, ELEVATION])},
-    {"position": CARTESIAN},
-    ["measured", "position"],
+    "cartesian", {"measured": [RANGE, AZIMUTH, ELEVATION]}, {"position": list(CARTESIAN)}
 ).function
 
 

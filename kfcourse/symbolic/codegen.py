@@ -4,11 +4,10 @@ formulas become code."""
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import compress, product
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -22,6 +21,10 @@ from kfcourse.symbolic.formula import MAX_DEGREE, NO_NUMBERS
 _as_products = create_expand_pow_optimization(MAX_DEGREE)
 
 
+# A vector's entries, or a matrix.
+Entries: TypeAlias = Sequence[sp.Expr] | sp.MatrixBase | sp.NDimArray
+
+
 @dataclass(frozen=True)
 class Compiled:
     """A generated function of arrays, and the source of its formulas."""
@@ -31,10 +34,7 @@ class Compiled:
 
 
 def compile_function(
-    name: str,
-    arguments: Mapping[str, sp.MatrixBase],
-    outputs: Mapping[str, sp.MatrixBase],
-    vectors: Sequence[str],
+    name: str, arguments: Mapping[str, Entries], outputs: Mapping[str, Entries]
 ) -> Compiled:
     """Compile expressions into one function of arrays.
 
@@ -43,12 +43,11 @@ def compile_function(
     name : str
         What the function is called in its source.
     arguments : dict
-        Argument name to the matrix of symbols that the argument holds.
+        Argument name to the symbols that the argument holds: a list of them is a vector (..., n), a
+        matrix is (..., r, c).
     outputs : dict
-        Output name to the matrix of expressions; the function returns them as a tuple in this
+        Output name to its expressions, likewise; the function returns arrays as a tuple in this
         order.
-    vectors : sequence of str
-        Arguments and outputs that are vectors (..., n); the others are matrices (..., r, c).
 
     Returns
     -------
@@ -61,58 +60,73 @@ def compile_function(
     ModelError
         No real number, a number beyond floats, a symbol that is no argument.
     """
-    matrices = (
-        tuple((key, sp.ImmutableMatrix(m)) for key, m in given.items())
-        for given in (arguments, outputs)
+    given, wanted = (
+        tuple((key, sp.ImmutableDenseNDimArray(formulas)) for key, formulas in of.items())
+        for of in (arguments, outputs)
     )
-    return _compiled(name, *matrices, tuple(vectors))
+    return _compiled(name, given, wanted)
 
 
 # the modes of a model, and models that differ in one noise, share an equation
 @lru_cache(maxsize=256)
 def _compiled(
     name: str,
-    arguments: tuple[tuple[str, sp.ImmutableMatrix], ...],
-    outputs: tuple[tuple[str, sp.ImmutableMatrix], ...],
-    vectors: tuple[str, ...],
+    arguments: tuple[tuple[str, sp.ImmutableDenseNDimArray], ...],
+    outputs: tuple[tuple[str, sp.ImmutableDenseNDimArray], ...],
 ) -> Compiled:
     # Symbols get names of our own, such as z_1 and p_12: no name of a formula reaches the code.
     places: dict[sp.Symbol, tuple[sp.Symbol, int, Any]] = {}
-    for number, (key, matrix) in enumerate(arguments):
-        for i, j in product(*map(range, matrix.shape)):
-            index = (i,) if key in vectors else (i, j)
-            text = "".join(str(k + 1) for k in index)
-            places.setdefault(matrix[i, j], (sp.Symbol(f"{key}_{text}", real=True), number, index))
-    for _, matrix in outputs:
-        check_numbers(name, matrix)
-        if unknown := matrix.free_symbols - places.keys():
+    for number, (key, formulas) in enumerate(arguments):
+        for index in np.ndindex(*formulas.shape):
+            own = sp.Symbol(f"{key}_{''.join(str(i + 1) for i in index)}", real=True)
+            places.setdefault(formulas[index], (own, number, index))
+    renamed = {symbol: place[0] for symbol, place in places.items()}
+    entries, parts = [], []
+    for _, formulas in outputs:
+        check_numbers(name, formulas)
+        if unknown := formulas.free_symbols - places.keys():
             raise ModelError(
                 f"{name}: the symbol {min(map(str, unknown))} is neither an argument nor defined; "
                 "give it a value, or make it an argument"
             )
-    renamed = {key: place[0] for key, place in places.items()}
-    entries = [
-        _in_floats(entry.xreplace(renamed))
-        for _, matrix in outputs
-        for entry in matrix
-        if not entry.is_number
-    ]
-    used = set().union(*(entry.free_symbols for entry in entries))
-    taken = [place for place in places.values() if place[0] in used]
-    formulas = sp.lambdify(
-        [symbol for symbol, *_ in taken], entries, ["scipy", "numpy"], cse=_shared
-    )
-    assembled = [_assembler(matrix, key in vectors, arguments) for key, matrix in outputs]
+        constant, varying = np.zeros(tuple(map(int, formulas.shape))), []
+        for index in np.ndindex(*constant.shape):
+            if formulas[index].is_number:
+                constant[index] = float(formulas[index])
+            else:
+                varying.append(index)
+                entries.append(_in_floats(formulas[index].xreplace(renamed)))
+        parts.append((constant, varying))
+    numeric = sp.lambdify([*renamed.values()], entries, ["scipy", "numpy"], cse=_shared)
 
     def function(*arrays: Array) -> tuple[Array, ...]:
-        values = iter(formulas(*(arrays[number][(..., *index)] for _, number, index in taken)))
+        values = iter(numeric(*(arrays[i][(..., *index)] for _, i, index in places.values())))
         leads = [
-            array.shape[: -1 if key in vectors else -2]
-            for array, (key, _) in zip(arrays, arguments, strict=True)
+            array.shape[: array.ndim - len(formulas.shape)]
+            for array, (_, formulas) in zip(arrays, arguments, strict=True)
         ]
-        return tuple(assemble(values, leads) for assemble in assembled)
+        return tuple(_assembled(*part, values, leads) for part in parts)
 
-    return Compiled(function, inspect.getsource(formulas).replace("_lambdifygenerated", name))
+    return Compiled(function, inspect.getsource(numeric).replace("_lambdifygenerated", name))
+
+
+def _assembled(
+    constant: Array,
+    varying: list[tuple[int, ...]],
+    values: Iterator[Array],
+    leads: list[tuple[int, ...]],
+) -> Array:
+    """An output, its entries that vary from the iterator: a vector has the leading axes of all
+    arguments, a matrix those of its entries."""
+    entries = [next(values) for _ in varying]
+    lead = np.broadcast_shapes(*(leads if constant.ndim == 1 else map(np.shape, entries)))
+    if entries and constant.size == 1:  # no copy of the one component
+        return np.broadcast_to(entries[0], lead)[(..., *(None for _ in constant.shape))]
+    result = np.empty(lead + constant.shape)
+    result[...] = constant
+    for index, entry in zip(varying, entries, strict=True):
+        result[(..., *index)] = entry
+    return result
 
 
 def _in_floats(expression: sp.Expr) -> sp.Expr:
@@ -132,47 +146,17 @@ def _shared(
     return [(name, _as_products(e)) for name, e in assignments], [_as_products(e) for e in reduced]
 
 
-def check_numbers(name: str, matrix: sp.MatrixBase) -> None:
+def check_numbers(name: str, formulas: sp.Basic) -> None:
     """ModelError if expressions hold what is no real number, or a number beyond floats."""
-    if matrix.has(*NO_NUMBERS):
+    if formulas.has(*NO_NUMBERS):
         raise ModelError(
             f"{name}: no finite real value, as something is divided by 0, or the root of a "
             "negative number taken; change the parameters, or, if so at the mean of a noise, take "
             "unscented(model) or gauss_hermite(model), or another mean"
         )
-    for number in matrix.atoms(sp.Rational, sp.Float):
+    for number in formulas.atoms(sp.Rational, sp.Float):
         if number and not 2.0**-1022 <= abs(number) < 2**1023:
             raise ModelError(
                 f"{name}: it holds the number {sp.N(number, 3)!s}, beyond what a float can be; "
                 "change the units"
             )
-
-
-def _assembler(
-    matrix: sp.ImmutableMatrix,
-    is_vector: bool,
-    arguments: tuple[tuple[str, sp.ImmutableMatrix], ...],
-) -> Callable[[Any, list[tuple[int, ...]]], Array]:
-    """Puts the entries of one output together, the values of those that vary from an iterator."""
-    indices = [(i,) if is_vector else (i, j) for i, j in product(*map(range, matrix.shape))]
-    constant = np.zeros(matrix.shape[:1] if is_vector else matrix.shape)
-    varying = []
-    for index, entry in zip(indices, matrix, strict=True):
-        if entry.is_number:
-            constant[index] = float(entry)
-        else:
-            varying.append(index)
-    enter = [is_vector or bool(m.free_symbols & matrix.free_symbols) for _, m in arguments]
-
-    def assemble(values: Any, leads: list[tuple[int, ...]]) -> Array:
-        lead = np.broadcast_shapes(*compress(leads, enter))
-        if varying and constant.size == 1:  # no copy of the one component
-            value = np.broadcast_to(next(values), lead)
-            return value[(..., *(None for _ in constant.shape))]
-        result = np.empty(lead + constant.shape)
-        result[...] = constant
-        for index in varying:
-            result[(..., *index)] = next(values)
-        return result
-
-    return assemble

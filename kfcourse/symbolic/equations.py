@@ -8,7 +8,6 @@ from typing import TypeAlias
 import sympy as sp
 
 from kfcourse.laws import Array
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 
 # a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends on
@@ -40,7 +39,5 @@ def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
 def _compiled(
     name: str, equation: sp.MatrixBase, letter: str, noise: tuple[sp.Symbol, ...], model: Model
 ) -> Equation:
-    arguments = {"x": sp.Matrix(model.x), letter: sp.Matrix(noise)}
-    numeric = {name: equation.subs(model.values)}
-    function = Stepwise.compile(model.known, name, arguments, numeric, [*arguments, name])
+    function = model.compiled(name, {"x": model.x, letter: noise}, {name: list(equation)})
     return lambda x, noise, k=None: function.at(k)(x, noise)[0]

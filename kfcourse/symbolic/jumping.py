@@ -12,7 +12,7 @@ code are derived as any model's are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -284,8 +284,8 @@ def _compiled(rows: Array, model: Model, changed: set[str]) -> tuple[sp.Immutabl
         )
     except (ModelError, FormulaError) as error:
         raise ModelError(f"`transition`: {error}") from None
-    numeric, known = {"transition": matrix.subs(model.values)}, model.known.used(matrix, of_step)
-    return matrix, Stepwise.compile(known, "transition", {"x": sp.Matrix(model.x)}, numeric, ["x"])
+    model = replace(model, known=model.known.used(matrix, of_step))
+    return matrix, model.compiled("transition", {"x": model.x}, {"transition": matrix})
 
 
 def _law(first: Any, size: int) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.codegen import Compiled, compile_function
+from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
     ModelError,
@@ -122,20 +122,6 @@ class Stepwise(NamedTuple):
 
     compiled: Compiled
     known: Known
-
-    @classmethod
-    def compile(
-        cls,
-        known: Known,
-        name: str,
-        arguments: Mapping[str, sp.MatrixBase],
-        outputs: Mapping[str, sp.MatrixBase],
-        vectors: Sequence[str],
-    ) -> Stepwise:
-        """Arguments as of `compile_function`."""
-        if known.symbols:
-            arguments = {**arguments, "known": sp.Matrix(known.symbols)}
-        return cls(compile_function(name, arguments, outputs, [*vectors, "known"]), known)
 
     def at(self, k: int | None) -> Callable[..., Any]:
         """The function at step k."""

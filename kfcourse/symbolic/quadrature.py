@@ -232,8 +232,7 @@ def _side(
     for _ in noises:  # and what is correlated with one of them
         pointed |= (law.cov[:, pointed] != 0).any(axis=1)
     cov = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
-    added = {"added": factors * cov * factors.T}
-    stepwise = Stepwise.compile(model.known, "added", {"x": sp.Matrix(model.x)}, added, ["x"])
+    stepwise = model.compiled("added", {"x": model.x}, {"added": factors * cov * factors.T})
     root = np.eye(len(noises))[:, pointed] @ square_root(law.cov[np.ix_(pointed, pointed)])
     return _Side(model, function, law.mean, root, stepwise, angles, len(equation))
 

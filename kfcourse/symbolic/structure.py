@@ -33,6 +33,7 @@ from kfcourse.laws import (
     Vectors,
     measurement_of,
 )
+from kfcourse.symbolic.codegen import Entries
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.sides import Side, moments, taylor
@@ -189,28 +190,23 @@ class StructuralFormulas:
 
     @cached_property
     def compiled_predict(self) -> Stepwise:
-        return self._compile(
-            "predict",
-            {"z": self.z, "p": self.p},
-            {key: self.functions[key] for key in ("tau", "Theta")},
-        )
+        tau, Theta = self.functions["tau"], self.functions["Theta"]
+        return self.model.compiled("predict", self._before, {"tau": list(tau), "Theta": Theta})
 
     @cached_property
     def compiled_measure(self) -> Stepwise:
         """h, G, R, and G d G^T: F is their sum."""
-        G = self.functions["G"]
-        outputs = {"h": self.functions["h"], "G": G, "R": self.R, "explained": G * self.d * G.T}
-        return self._compile("measure", {"m": self.m, "d": self.d}, outputs)
+        h, G = self.functions["h"], self.functions["G"]
+        outputs = {"h": list(h), "G": G, "R": self.R, "explained": G * self.d * G.T}
+        return self.model.compiled("measure", {"m": list(self.m), "d": self.d}, outputs)
 
     @cached_property
     def compiled_transition(self) -> Stepwise:
-        return self._compile("transition", {"z": self.z, "p": self.p}, {"A": self.A, "Q": self.Q})
+        return self.model.compiled("transition", self._before, {"A": self.A, "Q": self.Q})
 
-    def _compile(
-        self, name: str, arguments: dict[str, sp.MatrixBase], outputs: dict[str, sp.MatrixBase]
-    ) -> Stepwise:
-        numeric = {key: part.subs(self.model.values) for key, part in outputs.items()}
-        return Stepwise.compile(self.model.known, name, arguments, numeric, ["z", "m", "tau", "h"])
+    @property
+    def _before(self) -> dict[str, Entries]:
+        return {"z": list(self.z), "p": self.p}
 
     def structure(self) -> Structure:
         """The structure; of a model that depends on the step, one that must be told which."""

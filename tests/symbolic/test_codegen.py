@@ -15,7 +15,7 @@ from kfcourse.symbolic.structure import linearised
 pytestmark = pytest.mark.quick
 
 x1, x2, p11, p12, p22 = sp.symbols("x1 x2 p11 p12 p22", real=True)
-ARGUMENTS = {"x": sp.Matrix([x1, x2]), "p": sp.Matrix([[p11, p12], [p12, p22]])}
+ARGUMENTS = {"x": [x1, x2], "p": sp.Matrix([[p11, p12], [p12, p22]])}
 
 EXPRESSIONS = [
     x1**2 - 3 * x2**7 / 5,
@@ -57,9 +57,8 @@ def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
     below 1e3."""
     count = len(EXPRESSIONS) // 2
     together = sp.Matrix(count, 2, EXPRESSIONS)
-    found = compile_function(
-        "f", ARGUMENTS, {"value": together, "first": together[:, 0]}, ["x", "first"]
-    ).function(*ensemble)
+    outputs = {"value": together, "first": list(together[:, 0])}
+    found = compile_function("f", ARGUMENTS, outputs).function(*ensemble)
     assert found[0].shape == (50, count, 2)
     for i in range(count):
         np.testing.assert_allclose(found[1][:, i], found[0][:, i, 0], rtol=0, atol=0)
@@ -82,9 +81,7 @@ def test_what_models_share_is_compiled_once():
 
 def test_leading_axes_broadcast(ensemble):
     x, p = ensemble
-    code = compile_function(
-        "f", ARGUMENTS, {"value": sp.Matrix([x1 * p11, x2 - p12])}, ["x", "value"]
-    ).function
+    code = compile_function("f", ARGUMENTS, {"value": [x1 * p11, x2 - p12]}).function
     expected = code(x, np.broadcast_to(p[0], p.shape))[0]
     np.testing.assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
     np.testing.assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
@@ -97,14 +94,14 @@ def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
     x, p = ensemble
     both = sp.sin(p11) * sp.exp(p12)
     outputs = {
-        "x_next": sp.Matrix([x1, x2]),
+        "x_next": [x1, x2],
         "of_p": sp.Matrix([[both, both + 1], [both**2, p11]]),
         "of_all": sp.Matrix([[both, x1]]),
         "constant": sp.Matrix([[sp.sqrt(2)]]),
-        "vector": sp.Matrix([2 ** sp.Rational(1, 4)]),
-        "single": sp.Matrix([both]),
+        "vector": [2 ** sp.Rational(1, 4)],
+        "single": [both],
     }
-    code = compile_function("f", ARGUMENTS, outputs, ["x", "x_next", "vector", "single"]).function
+    code = compile_function("f", ARGUMENTS, outputs).function
     rest = [(1, 1), (50, 1), (50, 1)]
     assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2), *rest]
     assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2), *rest]
@@ -117,10 +114,8 @@ def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
 def test_no_symbol_can_hide_another(name, ensemble):
     # Names in the formula never reach the code as they are.
     odd = sp.Symbol(name, real=True)
-    arguments = {"x": sp.Matrix([odd, x2])}
-    found = compile_function(
-        "f", arguments, {"value": sp.Matrix([odd**2 + sp.sin(odd) + x2])}, ["x", "value"]
-    ).function(ensemble[0])[0]
+    value = odd**2 + sp.sin(odd) + x2
+    found = compile_function("f", {"x": [odd, x2]}, {"value": [value]}).function(ensemble[0])[0]
     first, second = ensemble[0].T
     np.testing.assert_allclose(
         found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14
@@ -128,10 +123,7 @@ def test_no_symbol_can_hide_another(name, ensemble):
 
 
 def compiled(*expressions):
-    x, y = symbol("x"), symbol("y")
-    return compile_function(
-        "f", {"x": sp.Matrix([x, y])}, {"o": sp.Matrix(expressions)}, ["x", "o"]
-    )
+    return compile_function("f", {"x": [symbol("x"), symbol("y")]}, {"o": expressions})
 
 
 def test_special_functions_are_scipys():
