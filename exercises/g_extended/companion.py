@@ -64,7 +64,7 @@ def linearisation(model: Model) -> Functions:
 
     def compiled(name: str) -> Map:
         formula = matrices[name]
-        function = model.compiled(name, {"x": model.x}, {name: formula})
+        function = model.compiled([model.x], [formula])
         shape = np.shape(formula)
 
         def of_arrays(at: Array, k: int | None = None) -> Array:

@@ -62,10 +62,8 @@ def extended_kalman_bucy(
     name = "kalman-bucy" + "-second" * second_derivatives + "-symmetrised" * symmetrised
     equations = filter_equations(model, second_derivatives)
     z, D, y = equations.z, equations.D, equations.y
-    arguments = {"z": list(z), "D": D, "y": list(y)}
-    matrices = {key: getattr(equations, key) for key in "AQH"}
-    vectors = {"f": list(equations.f), "S": list(equations.S)}
-    linear = compiled(model, {"z": list(z)}, vectors | matrices)
+    parts = [list(equations.f), equations.A, equations.Q, list(equations.S), equations.H]
+    linear = compiled(model, [list(z)], parts)
     W = equations.U - without_noise(equations.U, y, equations.S)
     intensity = exact_matrix(model.noise_density) / 2
     slopes = [W.diff(component) for component in y]  # W is linear in y
@@ -77,9 +75,9 @@ def extended_kalman_bucy(
     if symmetrised:
         added = symmetrised_drift(equations.rates, equations.state, list(y), intensity)
     by_state = dict(zip(equations.state, added, strict=True))
-    moved = {"dz": [by_state[component] for component in z], "dD": D.applyfunc(by_state.get)}
+    outputs = [W, V, [by_state[component] for component in z], D.applyfunc(by_state.get)]
     second = (
-        compiled(model, arguments, {"W": W, "V": V} | moved)
+        compiled(model, [list(z), D, list(y)], outputs)
         if second_derivatives or symmetrised
         else None
     )
@@ -90,7 +88,7 @@ def extended_kalman_bucy(
         with np.errstate(over="ignore", invalid="ignore"):
             z, D = state.predicted
             t = state.step * step
-            f, S, A, Q, H = linear(t, z)
+            f, A, Q, S, H = linear(t, z)
             measurement = Measurement(S, H, symmetric(product(product(H, D), transpose(H))) + R, R)
             mean, B = correct(state.predicted, measurement, y)
             M, cov = identity, B

@@ -134,9 +134,7 @@ def rates_of(
     if derived is not None:
         z, p, *rates = derived
         drift, A, Q = (part.subs(model.values) for part in rates)
-        arguments = {"known": model.known.symbols, "z": list(z), "p": p}
-        outputs = {"drift": list(drift), "A": A, "Q": Q}
-        return compile_function("rates", arguments, outputs).function
+        return compile_function([model.known.symbols, list(z), p], [list(drift), A, Q])
     structure = approximation(_seen(model))
 
     def by_points(known: Any, z: Vectors, p: Matrices) -> tuple[Array, ...]:

@@ -259,13 +259,12 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
 
 
 def compiled(
-    model: ContinuousModel, arguments: dict[str, Entries], outputs: dict[str, Entries]
+    model: ContinuousModel, arguments: Sequence[Entries], outputs: Sequence[Entries]
 ) -> Callable[..., Any]:
     """The generated function of the time and these arguments."""
-    numeric = {name: sp.Array(entries).subs(model.values) for name, entries in outputs.items()}
-    if model.time is not None:
-        arguments = {**arguments, "t": [model.time]}
-    function = compile_function("continuous", arguments, numeric).function
+    numeric = [sp.Array(entries).subs(model.values) for entries in outputs]
+    time = [] if model.time is None else [[model.time]]
+    function = compile_function([*arguments, *time], numeric)
     return (
         (lambda t, *arrays: function(*arrays))
         if model.time is None

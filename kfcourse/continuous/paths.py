@@ -52,8 +52,8 @@ def simulate(
     check_step(step)
     expect_sizes(steps=steps, runs=runs, substeps=substeps)
     rng, dt = np.random.default_rng(seed), step / substeps
-    formulas = {"f": list(model.drift), "g": model.diffusion, "S": list(model.signal)}
-    equations = compiled(model, {"x": model.x}, formulas)
+    formulas = [list(model.drift), model.diffusion, list(model.signal)]
+    equations = compiled(model, [model.x], formulas)
     xi_root, n_root = (
         square_root(model.spectral_density * dt / 2),
         square_root(model.noise_density / (2 * dt)),

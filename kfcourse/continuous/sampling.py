@@ -131,9 +131,8 @@ class Between:
         order 1 and weak order 2 if B is constant, 1/2 and 1 if it depends on x.
         """
         a, B = (part.subs(model.values) for part in (self.drift, self.diffusion))
-        arguments = {"x": model.x, "known": model.known.symbols}
-        drift = compile_function("drift", arguments, {"a": list(a)}).function
-        diffusion = compile_function("diffusion", arguments, {"B": B}).function
+        drift = compile_function([model.x, model.known.symbols], [list(a)])
+        diffusion = compile_function([model.x, model.known.symbols], [B])
 
         def motion(x: Array, noise: Array, k: int | None = None) -> Array:
             span, now = clock(model.known, k or 0)

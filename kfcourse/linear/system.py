@@ -155,5 +155,4 @@ def _affine(
             f"aof(linearised(model))"
         )
     constant = numeric.subs(dict.fromkeys(variables, 0))
-    outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": list(constant)}
-    return model.compiled("matrices", {}, outputs)
+    return model.compiled([], [slopes[:, : len(x)], slopes[:, len(x) :], list(constant)])

@@ -128,9 +128,8 @@ def _information(
         raise ValueError(
             _infinite(what, f"its noise vanishes at {model.x[0]} = {', '.join(map(str, zeros))}")
         )
-    outputs = {"slope": equation.subs(at_mean).jacobian(sp.Matrix(model.x)), "S": S}
-    outputs |= {f"S{i}": S.diff(x) for i, x in enumerate(model.x)}
-    functions = model.compiled(f"{what}_information", {"x": model.x}, outputs)
+    slope = equation.subs(at_mean).jacobian(sp.Matrix(model.x))
+    functions = model.compiled([model.x], [slope, S, *(S.diff(x) for x in model.x)])
 
     def at(x: Array, k: int) -> tuple[Array, Array, Array]:
         slope, S, *changes = (

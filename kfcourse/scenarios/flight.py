@@ -24,10 +24,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from kfcourse.errors import expect_positive
 from kfcourse.laws import Array
 
+STEP = Polynomial([0, 0, 3, -2])  # from 0 to 1 over 0 <= u <= 1, with zero slope at both ends
 PIECE = 1.0  # s; the horizontal path is integrated over pieces not longer than this
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
@@ -158,25 +160,19 @@ def aircraft(
     position = np.column_stack([np.add(start[:2], path), altitude])
     velocity = np.column_stack([speed[:, None] * forward, -descent * _step(since)])
     horizontal = slowing[:, None] * forward + (speed * turn_rate)[:, None] * left
-    acceleration = np.column_stack([horizontal, -descent / ramp * _step_slope(since)])
+    acceleration = np.column_stack(
+        [horizontal, -descent / ramp * STEP.deriv()(np.clip(since, 0.0, 1.0))]
+    )
     part = 1 + np.searchsorted(ends[:-1], time, side="right")
     return Track(time, position, velocity, acceleration, part)
 
 
 def _step(u: Array) -> Array:
-    """From 0 to 1 over 0 <= u <= 1, with zero slope at both ends."""
-    u = np.clip(u, 0.0, 1.0)
-    return u**2 * (3 - 2 * u)
-
-
-def _step_slope(u: Array) -> Array:
-    u = np.clip(u, 0.0, 1.0)
-    return 6 * u * (1 - u)
+    return STEP(np.clip(u, 0.0, 1.0))
 
 
 def _step_integral(u: Array) -> Array:
-    rising = np.clip(u, 0.0, 1.0)
-    return rising**3 - rising**4 / 2 + np.maximum(u - 1.0, 0.0)
+    return STEP.integ()(np.clip(u, 0.0, 1.0)) + np.maximum(u - 1.0, 0.0)
 
 
 def _plateau(t: Array, start: float, end: float, ramp: float) -> Array:

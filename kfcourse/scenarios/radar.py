@@ -32,12 +32,8 @@ CARTESIAN = sp.ImmutableMatrix(
     ]
 )
 
-_to_spherical = compile_function(
-    "spherical", {"position": [X, Y, Z]}, {"measured": list(SPHERICAL)}
-).function
-_to_cartesian = compile_function(
-    "cartesian", {"measured": [RANGE, AZIMUTH, ELEVATION]}, {"position": list(CARTESIAN)}
-).function
+_to_spherical = compile_function([[X, Y, Z]], [list(SPHERICAL)])
+_to_cartesian = compile_function([[RANGE, AZIMUTH, ELEVATION]], [list(CARTESIAN)])
 
 
 def spherical(position: Array) -> Array:

@@ -3,9 +3,7 @@ formulas become code."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -21,98 +19,86 @@ from kfcourse.symbolic.formula import MAX_DEGREE, NO_NUMBERS
 _as_products = create_expand_pow_optimization(MAX_DEGREE)
 
 
-# A vector's entries, or a matrix.
+# A list is a vector's entries.
 Entries: TypeAlias = Sequence[sp.Expr] | sp.MatrixBase | sp.NDimArray
 
 
-@dataclass(frozen=True)
-class Compiled:
-    """A generated function of arrays, and the source of its formulas."""
-
-    function: Callable[..., tuple[Array, ...]]
-    source: str
-
-
 def compile_function(
-    name: str, arguments: Mapping[str, Entries], outputs: Mapping[str, Entries]
-) -> Compiled:
+    arguments: Sequence[Entries], outputs: Sequence[Entries]
+) -> Callable[..., tuple[Array, ...]]:
     """Compile expressions into one function of arrays.
 
     Parameters
     ----------
-    name : str
-        What the function is called in its source.
-    arguments : dict
-        Argument name to the symbols that the argument holds: a list of them is a vector (..., n), a
-        matrix is (..., r, c).
-    outputs : dict
-        Output name to its expressions, likewise; the function returns arrays as a tuple in this
-        order.
+    arguments : sequence
+        The symbols that each argument holds: a list of them is a vector (..., n), a matrix is (...,
+        r, c).
+    outputs : sequence
+        The expressions of each output, likewise; the function returns arrays as a tuple.
 
     Returns
     -------
-    Compiled
-        `function(*arrays)`: leading axes broadcast.  A vector has those of all arguments, a matrix
-        those of the arguments that enter the matrix, and what no argument enters has none.
+    callable
+        Leading axes of its arrays broadcast.  A vector has those of all arguments, a matrix those
+        of the arguments that enter the matrix, and what no argument enters has none.
 
     Raises
     ------
     ModelError
         No real number, a number beyond floats, a symbol that is no argument.
     """
-    given, wanted = (
-        tuple((key, sp.ImmutableDenseNDimArray(formulas)) for key, formulas in of.items())
-        for of in (arguments, outputs)
+    return _compiled(
+        *(tuple(map(sp.ImmutableDenseNDimArray, each)) for each in (arguments, outputs))
     )
-    return _compiled(name, given, wanted)
 
 
 # the modes of a model, and models that differ in one noise, share an equation
 @lru_cache(maxsize=256)
 def _compiled(
-    name: str,
-    arguments: tuple[tuple[str, sp.ImmutableDenseNDimArray], ...],
-    outputs: tuple[tuple[str, sp.ImmutableDenseNDimArray], ...],
-) -> Compiled:
-    # Symbols get names of our own, such as z_1 and p_12: no name of a formula reaches the code.
-    places: dict[sp.Symbol, tuple[sp.Symbol, int, Any]] = {}
-    for number, (key, formulas) in enumerate(arguments):
-        for index in np.ndindex(*formulas.shape):
-            own = sp.Symbol(f"{key}_{''.join(str(i + 1) for i in index)}", real=True)
-            places.setdefault(formulas[index], (own, number, index))
-    renamed = {symbol: place[0] for symbol, place in places.items()}
+    arguments: tuple[sp.NDimArray, ...], outputs: tuple[sp.NDimArray, ...]
+) -> Callable[..., tuple[Array, ...]]:
+    places = [
+        (number, index)
+        for number, symbols in enumerate(arguments)
+        for index in np.ndindex(*symbols.shape)
+    ]
+    # Names of our own: no name of a formula reaches the code.
+    names = [sp.Symbol(f"a{i}", real=True) for i in range(len(places))]
+    renamed = {
+        arguments[number][index]: name for (number, index), name in zip(places, names, strict=True)
+    }
     entries, parts = [], []
-    for _, formulas in outputs:
-        check_numbers(name, formulas)
-        if unknown := formulas.free_symbols - places.keys():
+    for output in outputs:
+        check_numbers("a generated function", output)
+        if unknown := output.free_symbols - renamed.keys():
             raise ModelError(
-                f"{name}: the symbol {min(map(str, unknown))} is neither an argument nor defined; "
-                "give it a value, or make it an argument"
+                f"the symbol {min(map(str, unknown))} is neither an argument nor defined; give it "
+                f"a value, or make it an argument"
             )
-        constant, varying = np.zeros(tuple(map(int, formulas.shape))), []
+        constant, varying = np.zeros(tuple(map(int, output.shape))), []
         for index in np.ndindex(*constant.shape):
-            if formulas[index].is_number:
-                constant[index] = float(formulas[index])
+            if output[index].is_number:
+                constant[index] = float(output[index])
             else:
                 varying.append(index)
-                entries.append(_in_floats(formulas[index].xreplace(renamed)))
+                entries.append(_in_floats(output[index].xreplace(renamed)))
         parts.append((constant, varying))
-    numeric = sp.lambdify([*renamed.values()], entries, ["scipy", "numpy"], cse=_shared)
+    numeric = sp.lambdify(names, entries, ["scipy", "numpy"], cse=_shared)
 
     def function(*arrays: Array) -> tuple[Array, ...]:
-        values = iter(numeric(*(arrays[i][(..., *index)] for _, i, index in places.values())))
+        values = iter(numeric(*(arrays[number][(..., *index)] for number, index in places)))
         leads = [
-            array.shape[: array.ndim - len(formulas.shape)]
-            for array, (_, formulas) in zip(arrays, arguments, strict=True)
+            array.shape[: array.ndim - len(symbols.shape)]
+            for array, symbols in zip(arrays, arguments, strict=True)
         ]
         return tuple(_assembled(*part, values, leads) for part in parts)
 
-    return Compiled(function, inspect.getsource(numeric).replace("_lambdifygenerated", name))
+    return function
 
 
 def _assembled(
     constant: Array,
-    varying: list[tuple[int, ...]],
+    varying: list[Any],
     values: Iterator[Array],
     leads: list[tuple[int, ...]],
 ) -> Array:
@@ -122,10 +108,10 @@ def _assembled(
     lead = np.broadcast_shapes(*(leads if constant.ndim == 1 else map(np.shape, entries)))
     if entries and constant.size == 1:  # no copy of the one component
         return np.broadcast_to(entries[0], lead)[(..., *(None for _ in constant.shape))]
-    result = np.empty(lead + constant.shape)
+    result = np.empty((*lead, *constant.shape))
     result[...] = constant
     for index, entry in zip(varying, entries, strict=True):
-        result[(..., *index)] = entry
+        result[..., *index] = entry
     return result
 
 

@@ -285,7 +285,7 @@ def _compiled(rows: Array, model: Model, changed: set[str]) -> tuple[sp.Immutabl
     except (ModelError, FormulaError) as error:
         raise ModelError(f"`transition`: {error}") from None
     model = replace(model, known=model.known.used(matrix, of_step))
-    return matrix, model.compiled("transition", {"x": model.x}, {"transition": matrix})
+    return matrix, model.compiled([model.x], [matrix])
 
 
 def _law(first: Any, size: int) -> Array:

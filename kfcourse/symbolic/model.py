@@ -244,15 +244,12 @@ class Model:
         """Names of the measurement's components: y, or y1, y2, ..."""
         return _measured(self.p)
 
-    def compiled(
-        self, name: str, arguments: Mapping[str, Entries], outputs: Mapping[str, Entries]
-    ) -> Stepwise:
+    def compiled(self, arguments: Sequence[Entries], outputs: Sequence[Entries]) -> Stepwise:
         """A function of arrays for each step, as of `compile_function`, with the parameters'
         values."""
-        numeric = {key: sp.Array(entries).subs(self.values) for key, entries in outputs.items()}
-        if self.timed:
-            arguments = {**arguments, "known": self.known.symbols}
-        return Stepwise(compile_function(name, arguments, numeric), self.known)
+        numeric = [sp.Array(entries).subs(self.values) for entries in outputs]
+        known = [self.known.symbols] if self.timed else []
+        return Stepwise(compile_function([*arguments, *known], numeric), self.known)
 
     def replace(self, **parameters: float) -> Model:
         """The same model with some parameters changed: ``model.replace(f=0.2)``; ModelError where

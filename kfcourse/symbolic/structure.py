@@ -33,7 +33,6 @@ from kfcourse.laws import (
     Vectors,
     measurement_of,
 )
-from kfcourse.symbolic.codegen import Entries
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.sides import Side, moments, taylor
@@ -124,15 +123,6 @@ class Structure:
                 lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]
         return aligned(lines)
 
-    def source(self) -> str:
-        """The generated NumPy code that runs."""
-        formulas = self._derived()
-        return (
-            formulas.compiled_predict.compiled.source
-            + "\n\n"
-            + formulas.compiled_measure.compiled.source
-        )
-
     def _derived(self) -> StructuralFormulas:
         if self.formulas is None:
             raise NoClosedForm(
@@ -191,22 +181,18 @@ class StructuralFormulas:
     @cached_property
     def compiled_predict(self) -> Stepwise:
         tau, Theta = self.functions["tau"], self.functions["Theta"]
-        return self.model.compiled("predict", self._before, {"tau": list(tau), "Theta": Theta})
+        return self.model.compiled([list(self.z), self.p], [list(tau), Theta])
 
     @cached_property
     def compiled_measure(self) -> Stepwise:
         """h, G, R, and G d G^T: F is their sum."""
         h, G = self.functions["h"], self.functions["G"]
-        outputs = {"h": list(h), "G": G, "R": self.R, "explained": G * self.d * G.T}
-        return self.model.compiled("measure", {"m": list(self.m), "d": self.d}, outputs)
+        outputs = [list(h), G, self.R, G * self.d * G.T]
+        return self.model.compiled([list(self.m), self.d], outputs)
 
     @cached_property
     def compiled_transition(self) -> Stepwise:
-        return self.model.compiled("transition", self._before, {"A": self.A, "Q": self.Q})
-
-    @property
-    def _before(self) -> dict[str, Entries]:
-        return {"z": list(self.z), "p": self.p}
+        return self.model.compiled([list(self.z), self.p], [self.A, self.Q])
 
     def structure(self) -> Structure:
         """The structure; of a model that depends on the step, one that must be told which."""
