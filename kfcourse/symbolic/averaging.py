@@ -24,7 +24,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, tra
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, expect_each, of_steps
+from kfcourse.symbolic.structure import Structure, expect_each
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -46,7 +46,7 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
             f"{len(structures)}"
         )
 
-    return of_steps("averaged", model.modes[0], partial(_at, model, structures), timed=True)
+    return Structure("averaged", model.modes[0], at_step=partial(_at, model, structures))
 
 
 def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:

@@ -44,6 +44,12 @@ FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "
 FUNCTION_LATEX |= {"tau_dot": r"\dot\tau", "A": "A", "Theta_dot": r"\dot\Theta", "p_dot": r"\dot p"}
 
 
+def _at_no_step(mean: Vectors, cov: Matrices) -> NoReturn:
+    raise ModelError(
+        "the model depends on the step: say which, as in structure.at(k).predict(z, p)"
+    )
+
+
 @dataclass(frozen=True)
 class Structure:
     """The structural functions of a model, as functions of arrays and (if derived) as formulas.
@@ -70,9 +76,9 @@ class Structure:
 
     name: str
     model: Model
-    predict: Callable[[Vectors, Matrices], Gaussian]
-    measure: Callable[[Vectors, Matrices], Measurement]
-    transition: Callable[[Vectors, Matrices], Transition]
+    predict: Callable[[Vectors, Matrices], Gaussian] = _at_no_step
+    measure: Callable[[Vectors, Matrices], Measurement] = _at_no_step
+    transition: Callable[[Vectors, Matrices], Transition] = _at_no_step
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
 
@@ -226,22 +232,10 @@ def of_steps(
     model: Model,
     at: Callable[[Any], Structure],
     formulas: StructuralFormulas | None = None,
-    timed: bool = False,
 ) -> Structure:
-    """The structure at every step; of what depends on the step the structure that `Structure.at`
-    makes those of each step of."""
-
-    def refused(mean: Vectors, cov: Matrices) -> NoReturn:
-        raise ModelError(
-            f"what is found of {model} depends on the step: say which, as in "
-            f"structure.at(k).predict(z, p)"
-        )
-
-    return (
-        Structure(name, model, refused, refused, refused, formulas, at)
-        if timed or model.timed
-        else at(None)
-    )
+    """The structure at every step; of a model that depends on the step the structure whose
+    `Structure.at` makes those of each step."""
+    return Structure(name, model, formulas=formulas, at_step=at) if model.timed else at(None)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
