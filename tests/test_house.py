@@ -202,9 +202,9 @@ ROOMS = {
     "kfcourse/notebooks": 26_120,
     "kfcourse/pages": 9_550,
     "kfcourse/records": 6_300,
-    "kfcourse/scenarios": 11_160,
-    "kfcourse/symbolic": 21_220,
-    "tests": 196_650,
+    "kfcourse/scenarios": 10_860,
+    "kfcourse/symbolic": 21_080,
+    "tests": 196_310,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

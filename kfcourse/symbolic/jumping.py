@@ -34,7 +34,6 @@ from kfcourse.symbolic.reading import (
     shown,
     table,
 )
-from kfcourse.symbolic.typesetting import aligned
 
 # in which modes may differ
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")
@@ -202,16 +201,6 @@ class JumpModel:
         if not self.chain_of_step.known.symbols:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
-
-    def latex(self) -> str:
-        """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned`
-        block."""
-        lines = []
-        for name, mode in zip(self.names, self.modes, strict=True):
-            title = name.replace("_", r"\_")
-            lines += [rf"\text{{mode {title}:}}\quad &", *mode.lines()]
-        first = sp.Matrix([[sp.Float(share, 4) for share in self.first]])
-        return aligned([*lines, rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"])
 
     def __repr__(self) -> str:
         texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
