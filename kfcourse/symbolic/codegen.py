@@ -62,8 +62,9 @@ def _compiled(
         for number, symbols in enumerate(arguments)
         for index in np.ndindex(*symbols.shape)
     ]
-    # Names of our own: no name of a formula reaches the code.
-    names = [sp.Symbol(f"a{i}", real=True) for i in range(len(places))]
+    # Names of our own: no name of a formula reaches the code.  SymPy sorts by them, and sums are
+    # rounded in that order: covariances before means, noises before states.
+    names = [sp.Symbol(f"a{i:04}", real=True) for i in range(len(places), 0, -1)]
     renamed = {
         arguments[number][index]: name for (number, index), name in zip(places, names, strict=True)
     }

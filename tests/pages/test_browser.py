@@ -185,10 +185,10 @@ def test_intervals_above_the_bound_cover(page, id):
     """
     model = SCALAR[id]
     result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1)
-    result = np.array(
+    drawn = np.array(
         [array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)]
     )
-    ratio, error, bound = np.moveaxis(result, -1, 0)
+    ratio, error, bound = np.moveaxis(drawn, -1, 0)
     gaps = [result.gap(name) for name in ("aof-linearised", "aof-gaussian")]
     value, own = (
         np.array([getattr(gap, part) for gap in gaps]) for part in ("value", "standard_error")
