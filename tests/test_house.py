@@ -202,7 +202,7 @@ ROOMS = {
     "kfcourse/notebooks": 26_120,
     "kfcourse/pages": 9_550,
     "kfcourse/records": 6_300,
-    "kfcourse/scenarios": 10_860,
+    "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_920,
     "tests": 196_310,
 }

@@ -102,8 +102,7 @@ def test_other_models_are_refused():
     ):
         with pytest.raises(
             ModelError,
-            match=r"not position, velocity on each axis.*build it with kinematic\(interval, "
-            r"order=1,",
+            match=r"not position, velocity on each axis.*build it with kinematic\(interval,",
         ):
             alpha_beta(model, 0.3, 0.1)
     shifted = Model.define(["x1 + x2", "x2 + v1"], "x1 + w1", state_noise={"mean": 1.0})
