@@ -203,7 +203,7 @@ ROOMS = {
     "kfcourse/pages": 9_550,
     "kfcourse/records": 6_300,
     "kfcourse/scenarios": 10_800,
-    "kfcourse/symbolic": 20_920,
+    "kfcourse/symbolic": 20_980,
     "tests": 196_310,
 }
 OF_LAYOUT = {

@@ -84,10 +84,13 @@ def _compiled(
                 varying.append(index)
                 entries.append(_in_floats(output[index].xreplace(renamed)))
         parts.append((constant, varying))
-    numeric = sp.lambdify(names, entries, ["scipy", "numpy"], cse=_shared)
+    used = set().union(*(entry.free_symbols for entry in entries))
+    taken = {name: place for name, place in zip(names, places, strict=True) if name in used}
+    numeric = sp.lambdify([*taken], entries, ["scipy", "numpy"], cse=_shared)
 
     def function(*arrays: Array) -> tuple[Array, ...]:
-        values = iter(numeric(*(arrays[number][(..., *index)] for number, index in places)))
+        columns = (arrays[number][(..., *index)] for number, index in taken.values())
+        values = iter(numeric(*columns))
         leads = [
             array.shape[: array.ndim - len(symbols.shape)]
             for array, symbols in zip(arrays, arguments, strict=True)
