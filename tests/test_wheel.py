@@ -60,7 +60,9 @@ def test_it_is_complete(installed):
     places = {"kfcourse": target / "kfcourse", "exercises": target / "kfcourse" / "exercises"}
     for name, place in places.items():
         files = [path for path in (ROOT / name).rglob("*") if path.is_file()]
-        wanted = {path.relative_to(ROOT / name) for path in files if path.suffix != ".pyc"}
+        wanted = {
+            path.relative_to(ROOT / name) for path in files if "__pycache__" not in path.parts
+        }
         assert [file for file in wanted if not (place / file).exists()] == []
 
 

@@ -179,14 +179,12 @@ def test_intervals_above_the_bound_cover(page, id):
     are its own, so this compares these, too.
     """
     model = SCALAR[id]
-    package = compare(
-        lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1
-    )
-    result = np.array(
+    result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1)
+    drawn = np.array(
         [array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)]
     )
-    ratio, error, bound = np.moveaxis(result, -1, 0)
-    gaps = [package.gap(name) for name in ("aof-linearised", "aof-gaussian")]
+    ratio, error, bound = np.moveaxis(drawn, -1, 0)
+    gaps = [result.gap(name) for name in ("aof-linearised", "aof-gaussian")]
     value, own = (
         np.array([getattr(gap, part) for gap in gaps]) for part in ("value", "standard_error")
     )
@@ -196,6 +194,6 @@ def test_intervals_above_the_bound_cover(page, id):
     assert (
         np.abs(ratio.mean(axis=0) - value) < 4 * np.hypot(ratio.std(axis=0) / np.sqrt(40), own)
     ).all()
-    expected = package.bound()
+    expected = result.bound()
     spread = np.hypot(bound.std(axis=0) / np.sqrt(40), expected.standard_error)
     assert (np.abs(bound.mean(axis=0) - expected.value) < 4 * spread).all()

@@ -10,7 +10,6 @@ import sympy as sp
 
 from kfcourse.exercises.checks.steps import of_steps
 from kfcourse.laws import Array
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import exact_matrix
 
@@ -55,18 +54,18 @@ def linearisation(model: Model) -> Functions:
     }
     by_noise = b.jacobian(sp.Matrix(model.w)).subs(quiet)
     matrices = {
-        "f": a.subs(quiet),
+        "f": list(a.subs(quiet)),
         "Phi": a.subs(quiet).jacobian(x),
         "g": a.jacobian(sp.Matrix(model.v)).subs(quiet),
-        "S": b.subs(quiet),
+        "S": list(b.subs(quiet)),
         "H": b.subs(quiet).jacobian(x),
         "D_n": by_noise * exact_matrix(model.meter_noise.cov) * by_noise.T,
     }
 
     def compiled(name: str) -> Map:
-        formula = sp.ImmutableMatrix(matrices[name].subs(model.values))
-        function = Stepwise.compile(model.known, name, {"x": x}, {name: formula}, ["x", "f", "S"])
-        shape = formula.shape[:1] if name in ("f", "S") else formula.shape
+        formula = matrices[name]
+        function = model.compiled([model.x], [formula])
+        shape = np.shape(formula)
 
         def of_arrays(at: Array, k: int | None = None) -> Array:
             return np.array(np.broadcast_to(function.at(k)(at)[0], (*np.shape(at)[:-1], *shape)))
