@@ -123,14 +123,14 @@ def simulate(
 def foretold(ensemble: Ensemble, k: int, drawn: tuple[Array, Array] | None) -> Array:
     """y_k (runs, p) of an ensemble whose states x_{k-1} (runs, n) and modes (runs,), if it has any,
     are these; of the first step by the prior."""
-    jumps = isinstance(ensemble.model, JumpModel)
-    advance = _jumping(ensemble.model) if jumps else _moving(ensemble.model)
+    model = ensemble.model
+    advance = _jumping(model) if isinstance(model, JumpModel) else _moving(model)
     before, now = zip(*_noises(ensemble, 1, 2), strict=True)
-    if drawn is None:
-        state = _initial(ensemble)
-    else:
-        moved = advance(k - 1, *drawn[: 1 + jumps], *before)
-        state = [moved.x_next, moved.mode_next][: 1 + jumps]
+    state: Sequence[Array | None] = _initial(ensemble)
+    if drawn is not None:
+        size = len(state)  # two with modes
+        moved = advance(k - 1, *drawn[:size], *before)
+        state = (moved.x_next, moved.mode_next)[:size]
     return advance(k, *state, *now).y
 
 

@@ -21,12 +21,12 @@ import numpy as np
 from scipy.special import ndtr
 
 from kfcourse.angles import Components, difference
-from kfcourse.filters.base import Filter, State
+from kfcourse.filters.base import Draw, Filter, State
 from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.ensemble import Ensemble, foretold
 from kfcourse.symbolic.structure import Structure
 
-DRAWS = 16  # of what is neither a normal law nor a mixture: they widen the interval by 4 %
+DRAWS = 16  # of what is neither a normal law nor a mixture: they widen the interval by a tenth
 
 
 def scored(
@@ -40,13 +40,15 @@ def scored(
     """Both scores of the measurement y (runs, p) for each trajectory, (runs,), by the filter's own
     structural functions, or these; NaN for the second where the prediction cannot be had.  The
     batch, the first of several, gives what is drawn a seed."""
-    log = chosen.evidence(before, y, after) if chosen.evidence else None
+    unknown = np.full(len(y), np.nan)
+    log = chosen.evidence(before, y, after) if chosen.evidence else unknown
     if chosen.drawn is not None:
-        return log, crps_of_draws(y, _expected(chosen, before, batch), batch.model.angles.y)
+        expected = _expected(chosen.drawn, before, batch)
+        return log, crps_of_draws(y, expected, batch.model.angles.y)
     if chosen.mixture is not None:
         weights, laws = chosen.mixture(before)
-    elif log is not None:
-        return log, np.full(len(y), np.nan)
+    elif chosen.evidence is not None:
+        return log, unknown
     else:
         expects = (chosen.structure or structure).at(before.step).measure
         weights, laws = np.ones((1, 1)), [after.expected or expects(*before.predicted)]
@@ -57,13 +59,13 @@ def scored(
     return log, crps(errors, deviations, weights[:, None]).sum(axis=-1)
 
 
-def _expected(chosen: Filter, before: State, batch: Ensemble) -> Array:
+def _expected(draw: Draw, before: State, batch: Ensemble) -> Array:
     """Measurements drawn from what a filter expects, (DRAWS, runs, p)."""
     runs, key = len(before.posterior.mean), (*batch.seed.spawn_key, 1, before.step)
     seed = np.random.SeedSequence(batch.seed.entropy, spawn_key=key)
     drawn = None
     if before.step > 0:
-        x, mode = chosen.drawn(before, DRAWS, np.random.default_rng(seed))  # type: ignore[misc]
+        x, mode = draw(before, DRAWS, np.random.default_rng(seed))
         drawn = x.reshape(-1, x.shape[-1]), mode.ravel()
     y = foretold(replace(batch, runs=DRAWS * runs, seed=seed, wide=None), before.step, drawn)
     return y.reshape(DRAWS, runs, -1)
