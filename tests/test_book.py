@@ -637,7 +637,7 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
     code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
     assert code == [
         cell.source
-        for cell in nbformat.read(EXECUTED / "ten-minutes.ipynb", 4).cells
+        for cell in nbformat.read(EXECUTED / "course" / "ten-minutes.ipynb", 4).cells
         if cell.cell_type == "code"
     ]
 
