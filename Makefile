@@ -20,14 +20,14 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
-	@echo "make page NAME=drive   one page alone, to look at: half a minute; links to other pages lead nowhere"
+	@echo "make page NAME=beyond/drive   one page alone, to look at: half a minute; links to other pages lead nowhere"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
 	@echo "make nightly     the same, and the tests marked slow: coverage of intervals, hostile processes, all pages"
 	@echo "make quick       lint, types and the quick tests of the house, of formulas and of linear filters: a minute of CPU"
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
-	@echo "make fuzz        20,000 generated formulas, models and files of variants; 1,000 are part of make unit"
+	@echo "make fuzz        20,000 generated formulas, models and files of variants; 300 are part of make unit"
 	@echo "make benchmark   speed of the engine, as ratios"
 	@echo "make literature  the figures of the literature beside ours"
 	@echo "make figure      the figure of README.md"
@@ -43,7 +43,7 @@ book: install
 # Of what Sphinx says, all but that the other pages are not there.
 PAGE := _build/page/_build/html
 page: install
-	@test -f "book/$(NAME).md" || { echo "make page NAME=drive: the name of a file book/NAME.md without its ending" >&2; exit 1; }
+	@test -f "book/$(NAME).md" || { echo "make page NAME=beyond/drive: the name of a file book/NAME.md without its ending" >&2; exit 1; }
 	@test -z "$$(find kfcourse exercises -name '*.py' -newer _build/page/_toc.yml 2>&1)" || rm -rf _build/page
 	@rm -rf $(PAGE) && mkdir -p _build/page _build/sample
 	@printf 'format: jb-book\nroot: intro\nchapters:\n  - file: %s\n' "$(NAME)" > _build/page/_toc.yml
@@ -63,9 +63,12 @@ QUICK := tests/test_house.py tests/test_laws.py tests/symbolic tests/linear
 quick: lint
 	$(BIN)/pytest -q -n 0 -m quick $(QUICK)
 
+# The types of the package as it is installed: with the exercises in it.
+TYPED := _build/typed
 lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	rm -rf $(TYPED) && mkdir -p $(TYPED) && cp -r kfcourse $(TYPED) && cp -r exercises $(TYPED)/kfcourse
 	$(BIN)/mypy
 	$(BIN)/python .ci/columns.py
 
@@ -75,7 +78,7 @@ unit: install
 # Other cases each time; what fails is shown with the case, as small as can be.
 CASES := 20000
 fuzz: install
-	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py tests/derivations
+	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py tests/exercises/derivations
 
 # Executes every notebook of the built book once more and compares all outputs but pictures, which therefore are not drawn
 # again; so it does with the worked solutions of the exercises, for variants of different kinds: multiplicative noises, a sine
@@ -87,7 +90,7 @@ notebooks: install
 	  $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env $(CHOSEN) tests/test_book.py _build/jupyter_execute _build/solutions
 
 literature: install
-	$(BIN)/python book/chapters.py literature
+	$(BIN)/python book/chapters.py beyond/literature
 
 figure: install
 	$(BIN)/python book/readme_figure.py

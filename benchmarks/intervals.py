@@ -44,14 +44,6 @@ def filters_of(name: str) -> list[Filter | Design]:
     return [known.built for known in admissions(model, names) if known.built]
 
 
-def designed(filters: Sequence[Filter | Design], ensemble: Ensemble, jobs: int) -> list[Filter]:
-    """The filters, those that need it designed on the ensemble."""
-    ready = iter(
-        design([filter_ for filter_ in filters if isinstance(filter_, Design)], ensemble, jobs)
-    )
-    return [next(ready) if isinstance(filter_, Design) else filter_ for filter_ in filters]
-
-
 def questions(result: Comparison) -> dict[str, list[Estimate]]:
     """What a report states with an interval."""
     control, others = result.control, [name for name in result.entrants if name != result.control]
@@ -96,7 +88,7 @@ def another_design(
     ]
     work = {"jobs": jobs, "progress": False}
     results = [
-        compare(designed(filters, ensemble, jobs), model, runs, steps, 1, **work)
+        compare(design(filters, ensemble, jobs), model, runs, steps, 1, **work)
         for ensemble in ensembles
     ]
     names = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
@@ -112,7 +104,7 @@ def line(name: str, seeds: int, runs: int, steps: int | None, designs: int, jobs
     steps = steps or variant.steps
     filters = filters_of(name)
     model, work = variant.model, {"jobs": jobs, "progress": False}
-    ready = designed(filters, Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 0), jobs)
+    ready = design(filters, Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 0), jobs)
     results = [
         questions(compare(ready, model, runs, steps, seed, **work)) for seed in range(1, 1 + seeds)
     ]

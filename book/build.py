@@ -33,8 +33,8 @@ SOURCES = ("_config.yml", "requirements.txt", "book", "exercises", "kfcourse")
 MADE = (
     "book/manual",
     "book/package",
-    "book/equations.md",
-    "book/equations-beyond.md",
+    "book/reference/equations.md",
+    "book/reference/equations-beyond.md",
 )  # by the build
 BUILT = BUILD / ".built-from"
 PAGE = BUILD / "html" / "index.html"

@@ -3,7 +3,7 @@
 Sphinx would execute them one after another.  The worked solutions of the lab manual run in the same
 processes.
 
-    python book/chapters.py literature      execute one chapter, and print what its cells print
+    python book/chapters.py beyond/literature      execute one chapter, print what its cells say
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from myst_nb.core.read import is_myst_markdown_notebook, myst_nb_reader_plugin
 from nbclient.exceptions import DeadKernelError
 from nbformat import NotebookNode
 
-from kfcourse.notebooks.execution import first_error
-from kfcourse.notebooks.jobs import Job, Outcome, make, run_all
+from kfcourse.exercises.notebooks.execution import first_error
+from kfcourse.exercises.notebooks.jobs import Job, Outcome, make, run_all
 
 BOOK = Path(__file__).resolve().parent
 SETTINGS = yaml.safe_load((BOOK.parent / "_config.yml").read_text(encoding="utf-8"))["execute"]
@@ -106,7 +106,7 @@ def executed(folder: Path) -> Iterator[tuple[str, NotebookNode]]:
     cache = get_cache(folder)
     for path in notebooks():
         _, notebook = cache.merge_match_into_notebook(myst_nb_reader_plugin(str(path)))
-        yield path.stem, notebook
+        yield path.relative_to(BOOK).with_suffix("").as_posix(), notebook
 
 
 def show(name: str) -> int:

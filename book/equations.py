@@ -17,7 +17,7 @@ from gate.page import judged, mark
 from kfcourse.pages.verification import VERIFIED
 
 BOOK = Path(__file__).resolve().parent
-COURSE, BEYOND = "equations", "equations-beyond"
+COURSE, BEYOND = "reference/equations", "reference/equations-beyond"
 HEAD = """\
 (all-equations)=
 # All equations
@@ -92,7 +92,7 @@ def pages(chapters: Iterable[tuple[str, list[dict]]]) -> dict[str, str]:
         if shown:
             parts[page_of(document)] += [
                 f"({place_of(document)})=\n## {_title(document)}\n\n{_count(here)}: "
-                f"{{doc}}`{document}`\n",
+                f"{{doc}}`/{document}`\n",
                 *shown,
             ]
     heads = {COURSE: HEAD, BEYOND: HEAD_BEYOND}
@@ -101,7 +101,7 @@ def pages(chapters: Iterable[tuple[str, list[dict]]]) -> dict[str, str]:
 
 def place_of(document: str) -> str:
     """Where a chapter's equations stand on their page."""
-    return f"equations-of-{document}"
+    return f"equations-of-{document.rpartition('/')[2]}"
 
 
 def _title(document: str) -> str:

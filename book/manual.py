@@ -13,11 +13,11 @@ from pathlib import Path
 import nbformat
 import sympy as sp
 
-from kfcourse.checks import exercise, sets
+from kfcourse.exercises.checks import exercise, sets
+from kfcourse.exercises.notebooks.execution import pictures
+from kfcourse.exercises.notebooks.jobs import Job, plan
+from kfcourse.exercises.notebooks.master import read, render, statement, student
 from kfcourse.lab.variants import load_variants
-from kfcourse.notebooks.execution import pictures
-from kfcourse.notebooks.jobs import Job, plan
-from kfcourse.notebooks.master import read, render, statement, student
 
 VARIANT = "53"
 PAGES = Path(__file__).resolve().parent / "manual"

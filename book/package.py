@@ -11,17 +11,22 @@ import shutil
 from pathlib import Path
 
 PAGES = Path(__file__).resolve().parent / "package"
-PACKAGE = Path(__file__).resolve().parent.parent / "kfcourse"
+ROOT = Path(__file__).resolve().parent.parent
+# The sets are not shown: they are the right answers.
+PLACES = {"kfcourse": ROOT / "kfcourse", "kfcourse.exercises": ROOT / "exercises"}
+HIDDEN = ROOT / "exercises" / "sets"
 ALONE = "The files that stand alone."
 
 
 def folders() -> dict[str, dict[str, Path]]:
     """The files of each folder by name; `kfcourse` has those without a folder of their own."""
     result: dict[str, dict[str, Path]] = {}
-    for folder in sorted({path.parent for path in PACKAGE.rglob("*.py")}):
-        name = ".".join(folder.relative_to(PACKAGE.parent).parts)
-        files = {f"{name}.{path.stem}": path for path in sorted(folder.glob("*.py"))}
-        result[name] = {key: path for key, path in files.items() if not path.stem.startswith("__")}
+    for package, place in PLACES.items():
+        for folder in sorted({path.parent for path in place.rglob("*.py")}):
+            if not folder.is_relative_to(HIDDEN):
+                name = ".".join([package, *folder.relative_to(place).parts])
+                files = [path for path in sorted(folder.glob("*.py")) if path.stem[:2] != "__"]
+                result[name] = {f"{name}.{path.stem}": path for path in files}
     return result
 
 
@@ -36,7 +41,7 @@ def write() -> None:
 
 def page(folder: str, files: dict[str, Path]) -> str:
     """A folder's page in MyST Markdown."""
-    about = ALONE if folder == PACKAGE.name else documented(folder, members=False)
+    about = ALONE if folder == "kfcourse" else documented(folder, members=False)
     rows = [f"| {{py:mod}}`~{name}` | {sentence(path)} |" for name, path in files.items()]
     head = [f"# {folder}", "", about, "", "| file | what it is for |", "| --- | --- |", *rows, ""]
     parts = [f"## {name.removeprefix(folder + '.')}\n\n{documented(name)}" for name in files]
@@ -58,9 +63,9 @@ def sentence(path: Path) -> str:
 def table() -> str:
     """The folders with a sentence each."""
     about = {
-        name: sentence(PACKAGE.parent.joinpath(*name.split("."), "__init__.py"))
-        for name in folders()
+        name: sentence(next(iter(files.values())).with_name("__init__.py"))
+        for name, files in folders().items()
     }
-    about[PACKAGE.name] = ALONE
-    rows = [f"| {{doc}}`{name} <package/{name}>` | {text} |" for name, text in about.items()]
+    about["kfcourse"] = ALONE
+    rows = [f"| {{doc}}`{name} </package/{name}>` | {text} |" for name, text in about.items()]
     return "\n".join(["| folder | what lives there |", "| --- | --- |", *rows, ""])

@@ -1,6 +1,6 @@
 """The command line: `kfcourse lab 53`, `kfcourse variants`, `kfcourse estimate`, ...
 
-The instructor's commands are in `kfcourse.notebooks.commands`.
+The instructor's commands are in `kfcourse.exercises.commands`.
 """
 
 from __future__ import annotations
@@ -12,15 +12,16 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import click
 
-from kfcourse.checks.posing import unposed
-from kfcourse.derivations import check_text
-from kfcourse.derivations.setting import of_model
 from kfcourse.errors import NotFinite
+from kfcourse.exercises.checks.posing import unposed
+from kfcourse.exercises.derivations import check_text
+from kfcourse.exercises.derivations.setting import of_model
 from kfcourse.files import replacing_together, save
 from kfcourse.lab import admission, grammar, quality
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
@@ -48,9 +49,8 @@ from kfcourse.lab.variants import RUNS as CHECKED
 from kfcourse.lab.variants import STEPS, find_variant, read_tables, read_variants, summary
 from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.experiment import without_failing
+from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.parallel import cores
-from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
@@ -76,7 +76,9 @@ JOBS = click.option(
     "--threads",
     "jobs",
     type=click.IntRange(min=1),
-    help="Processor cores to use; does not change the numbers.  [default: all]",
+    default=cores,
+    show_default="all",
+    help="Processor cores to use; does not change the numbers.",
 )
 
 
@@ -116,7 +118,7 @@ class _Group(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         instructors = name in INSTRUCTORS
         return (
-            getattr(import_module("kfcourse.notebooks.commands"), name)
+            getattr(import_module("kfcourse.exercises.commands"), name)
             if instructors
             else self.commands.get(name)
         )
@@ -206,7 +208,7 @@ def lab(
     names: str | None,
     bound: bool,
     same_ensemble: bool,
-    jobs: int | None,
+    jobs: int,
     dask: str | None,
     out: Path | None,
     language: str,
@@ -220,8 +222,8 @@ def lab(
     """
     chosen = find_variant(variant, variants_file)
     model = chosen.model
-    jumps = isinstance(model, JumpModel)
-    entries, usual = (JUMP_FILTERS, JUMP_LAB) if jumps else (FILTERS, LAB)
+    plain = isinstance(model, Model)
+    entries, usual = (FILTERS, LAB) if plain else (JUMP_FILTERS, JUMP_LAB)
     if names is None:
         bound = bound or has_exact(model)
         wanted = [*usual, *[EXACT] * bound]
@@ -249,21 +251,21 @@ def lab(
     if not filters:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
         raise click.ClickException(reasons or "give at least one filter: --filters duof")
-    folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
+    folder = out or _below(f"lab-{chosen.name}")
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = without_failing(
-        filters, model, runs, steps or chosen.steps, seed,
-        left_out=refused, same_ensemble=same_ensemble, jobs=jobs, dask=dask,
-        scores=judging(model) if scores else None,
+    result = compare(
+        filters, model, runs, steps or chosen.steps, seed, same_ensemble=same_ensemble, jobs=jobs,
+        dask=dask, scores=judging(model) if scores else None,
     )  # fmt: skip
+    result = replace(result, left_out={**refused, **result.left_out})
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
     to_error = str(json_file) in STANDARD_OUTPUT
     _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
-    with _kept(folder), replacing_together(folder) as place:
+    with _kept(folder) as place:
         modes = recognised_modes(result, filters)
         write_report(chosen, result, place, language, [*known.values()], modes)
     click.echo(
@@ -289,10 +291,11 @@ def _tell(result: Comparison, to_error: bool) -> None:
 
 
 @contextmanager
-def _kept(folder: Path) -> Iterator[None]:
-    """A report that fails changes nothing in its folder."""
+def _kept(folder: Path) -> Iterator[Path]:
+    """A place whose files go to the folder; a report that fails changes nothing there."""
     try:
-        yield
+        with replacing_together(folder) as place:
+            yield place
     except (OSError, MemoryError):
         raise
     except Exception as error:
@@ -350,7 +353,7 @@ def variants(
     wanted: int | None,
     seed: int,
     runs: int,
-    jobs: int | None,
+    jobs: int,
     out: Path | None,
 ) -> None:
     """List the variants of the lab, check them, or propose new ones."""
@@ -359,7 +362,7 @@ def variants(
     if wanted is None and out:
         raise click.UsageError("--out goes with --generate only")
     if wanted is not None:
-        _generate(wanted, seed, runs, jobs or cores(), out)
+        _generate(wanted, seed, runs, jobs, out)
         return
     if not check and variants_file is None:  # that the shipped ones are models was tested
         tables = read_tables(names=names)
@@ -369,9 +372,7 @@ def variants(
     chosen, faults = read_variants(variants_file, names)
     good = not faults
     if check and chosen:
-        qualities = list(
-            quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed)
-        )
+        qualities = list(quality.examine_all(list(chosen.values()), runs, seed, jobs, unposed))
         click.echo(quality.table(qualities))
         good &= all(examined.well_posed for examined in qualities)
     else:
@@ -537,7 +538,7 @@ def estimate(
     prior = { mean = 0, variance = 100 }
     """
     variant = model_of(model_file, name)
-    folder = out or Path("estimate-" + re.sub(r"[^\w.-]+", "-", file.stem))
+    folder = out or _below(f"estimate-{file.stem}")
     drawn = _pair(track, [symbol.name for symbol in variant.model.x]) if track else None
     columns = dict(pair.partition("=")[::2] for pair in pairs)
     if not all(columns.values()):
@@ -551,13 +552,18 @@ def estimate(
         unknown=_names(unknown), positive=_names(positive),
     )  # fmt: skip
     click.echo("\n".join(result.says()))
-    with _kept(folder), replacing_together(folder) as place:
+    with _kept(folder) as place:
         write_record(result, place, drawn)
     click.echo(f"Report: {folder / 'report.html'}; numbers: {folder / 'estimate.csv'}")
 
 
 def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
+    return re.findall(r"[^\s,]+", text)
+
+
+def _below(name: str) -> Path:
+    """A folder of this name, and no other."""
+    return Path(re.sub(r"[^\w.-]+", "-", name))
 
 
 def _pair(text: str, known: list[str]) -> tuple[str, str]:

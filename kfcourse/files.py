@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -21,7 +22,8 @@ def replacing(target: Path) -> Iterator[Path]:
     """
     target = target.resolve()
     replaced = target.is_file() or not target.exists()
-    path = target.with_name(f".{os.getpid()}-{target.name}") if replaced else target
+    own = f".{os.getpid()}-{threading.get_ident()}-{target.name}"  # others may write the same file
+    path = target.with_name(own) if replaced else target
     try:
         yield path
         if replaced:

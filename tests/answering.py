@@ -1,8 +1,6 @@
 """Figures that answer, for tests: each figure of the book on a page of its own, and what is done
 with it."""
 
-from __future__ import annotations
-
 import json
 import re
 from functools import cache

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from kfcourse.notebooks.execution import BROWSERS
+from kfcourse.exercises.notebooks.execution import BROWSERS
 
 # The suggestions of the address bar, which nobody sees here, are two pages of their own in each
 # window: a CPU-second.

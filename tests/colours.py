@@ -47,13 +47,13 @@ def _linear(colour) -> np.ndarray:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def contrast(one, other) -> float:
+def contrast(ink, paper) -> float:
     """Contrast ratio of two colours (WCAG 2)."""
-    low, high = sorted(_linear(colour) @ _LUMINANCE for colour in (one, other))
+    low, high = sorted(_linear(colour) @ _LUMINANCE for colour in (ink, paper))
     return (high + 0.05) / (low + 0.05)
 
 
-def apart(one, other) -> float:
+def apart(first, second) -> float:
     """The distance in CIELAB for the eyes to which it is the least; 2.3 is just noticed."""
 
     def place(colour, seen):
@@ -62,7 +62,7 @@ def apart(one, other) -> float:
         return np.array([116 * f[1], 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
     return min(
-        float(np.linalg.norm(place(one, seen) - place(other, seen))) for seen in EYES.values()
+        float(np.linalg.norm(place(first, seen) - place(second, seen))) for seen in EYES.values()
     )
 
 

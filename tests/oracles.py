@@ -1,8 +1,6 @@
 """Slow reference code, written straight from the pages and independent of the package's
 computations."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

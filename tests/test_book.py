@@ -4,8 +4,6 @@
 these tests.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import re
@@ -64,14 +62,14 @@ class Resources(HTMLParser):
 
     def __init__(self) -> None:
         super().__init__()
-        self.found: list[str] = []
+        self.loads: list[str] = []
         self.opened: list[str] = []
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         named = dict(attributes)
         address, link = named.get(LOADS.get(tag, "")), named.get("rel") if tag == "link" else None
         if address and link not in ("canonical", "license"):
-            self.found.append(address)
+            self.loads.append(address)
             if link in (None, "stylesheet", "icon") and named.get("loading") != "lazy":
                 self.opened.append(address)
 
@@ -84,8 +82,8 @@ def loaded(page: str) -> Resources:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_page_exists_and_loads_only_local_files(page: str) -> None:
-    matched = loaded(page).found
+def test_page_exists_and_loads_only_local_files(page: str):
+    matched = loaded(page).loads
     assert matched, "no style sheet and no script: not a page of this book"
     for address in matched:
         if address.startswith("data:"):
@@ -96,15 +94,23 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
         )
 
 
-def test_style_sheets_load_only_local_files() -> None:
+def test_style_sheets_load_only_local_files():
     for sheet in (HTML / "_static").rglob("*.css"):
         assert not re.search(
             r"(@import\s+|url\()\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")
         ), sheet
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("stratonovich", "course/stratonovich"), ("particles", "beyond/grid")]
+)
+def test_an_old_address_leads_on(old: str, new: str) -> None:
+    page = (HTML / f"{old}.html").read_text(encoding="utf-8")
+    assert f'location.replace("{new}.html" + location.hash)' in page
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
-def test_notebook_is_executed_without_errors(page: str) -> None:
+def test_notebook_is_executed_without_errors(page: str):
     notebook = nbformat.read(EXECUTED / f"{page}.ipynb", as_version=4)
     cells = [cell for cell in notebook.cells if cell.cell_type == "code" and cell.source.strip()]
     assert cells
@@ -115,7 +121,7 @@ def test_notebook_is_executed_without_errors(page: str) -> None:
             assert output.output_type != "error" or allowed, f"{output.ename}: {output.evalue}"
 
 
-def test_no_notebook_is_left_out() -> None:
+def test_no_notebook_is_left_out():
     assert NOTEBOOKS
     assert {
         path.relative_to(EXECUTED).with_suffix("").as_posix() for path in EXECUTED.rglob("*.ipynb")
@@ -219,18 +225,18 @@ UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-out
     const all = document.createRange();
     return (shown ? [...shown.querySelectorAll(":scope > p, mjx-container > :first-child")] : []).filter((e) => {
       all.selectNodeContents(e);
-      return [...all.getClientRects()].some((one) => one.right > left && one.top < bottom - 2 && one.bottom > top + 2);
+      return [...all.getClientRects()].some((box) => box.right > left && box.top < bottom - 2 && box.bottom > top + 2);
     }).map((e) => e.textContent.slice(-60));
   })"""
 # Set formulas wider than their column, those in folds too.
 TOO_WIDE = """() => {
     const folds = [...document.querySelectorAll("article details:not([open])")];
     for (const fold of folds) fold.open = true;
-    const found = [...document.querySelectorAll("article div.math mjx-container")]
+    const wide = [...document.querySelectorAll("article div.math mjx-container")]
         .filter((e) => e.scrollWidth > e.clientWidth + 1)
         .map((e) => `${e.textContent.slice(0, 60)} (+${e.scrollWidth - e.clientWidth})`);
     for (const fold of folds) fold.open = false;
-    return found;
+    return wide;
 }"""
 # Figures in sight whose letters of 10 pt are smaller than 10 px.
 TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
@@ -241,10 +247,10 @@ LONGEST = 10_500
 # A sheet of A4 less its margins, in px of CSS.
 PAPER = 673
 AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
-FOUND = """async (context, rules) => {
+VIOLATIONS = """async (context, rules) => {
     const { violations } = await axe.run(context, { resultTypes: ["violations"], ...rules });
     const serious = violations.filter(({ impact }) => impact !== "minor");
-    return serious.flatMap(({ id, impact, nodes }) => nodes.map((one) => `${impact} ${id}: ${one.html.slice(0, 200)}`));
+    return serious.flatMap(({ id, impact, nodes }) => nodes.map((node) => `${impact} ${id}: ${node.html.slice(0, 200)}`));
 }"""
 # Thins out the page, as axe takes as long as there are elements: the insides of formulas, which
 # keep their size and have no text of their own, and spans that only colour code and signatures,
@@ -257,7 +263,7 @@ THIN = """(themes) => {
         e.replaceChildren();
     }
     const texts = [...document.body.querySelectorAll("*")]
-        .filter((e) => [...e.childNodes].some((one) => one.nodeType === Node.TEXT_NODE && one.data.trim()));
+        .filter((e) => [...e.childNodes].some((node) => node.nodeType === Node.TEXT_NODE && node.data.trim()));
     const looks = new Map(texts.map((e) => [e, ""]));
     for (const theme of themes) {
         document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
@@ -307,15 +313,15 @@ ONLY_MARKED = """() => {
 THEMES = ["light", "dark"]
 COLOURS = ["color-contrast", "link-in-text-block"]
 # has formulas and code of all kinds, and is looked at before it is thinned out, too
-WHOLE = "stratonovich"
+WHOLE = "course/stratonovich"
 AUDIT = (
-    f"(colours) => ({FOUND})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, "
+    f"(colours) => ({VIOLATIONS})(document, {{ rules: Object.fromEntries(colours.map((id) => [id, "
     f"{{ enabled: false }}])) }})"
 )
 CONTRAST = f"""([theme, colours]) => {{
     document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
     const include = [...document.querySelectorAll("[data-marked]")];
-    return include.length ? ({FOUND})({{ include }}, {{ runOnly: colours }}) : [];
+    return include.length ? ({VIOLATIONS})({{ include }}, {{ runOnly: colours }}) : [];
 }}"""
 
 
@@ -333,10 +339,10 @@ def show_on(tab, media: str, width: int) -> None:
 KINDS = [
     "intro",
     WHOLE,
-    "comparison",
-    "consistency",
+    "course/comparison",
+    "course/consistency",
     "manual/b-aof",
-    "glossary",
+    "reference/glossary",
     "package/kfcourse.filters",
     "search",
     "404",
@@ -349,7 +355,7 @@ OTHERS = [
 
 
 @pytest.mark.parametrize("page", [*KINDS, *OTHERS])
-def test_page_in_a_browser_without_network(window, page: str) -> None:
+def test_page_in_a_browser_without_network(window, page: str):
     """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark;
     code is folded."""
     tab, problems = window
@@ -400,7 +406,7 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
 
 def test_the_keyboard_reaches_the_text_first(window):
     tab, _ = window
-    tab.goto((HTML / "linearisation.html").as_uri())
+    tab.goto((HTML / "course/linearisation.html").as_uri())
     tab.keyboard.press("Tab")
     assert tab.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
     assert tab.evaluate("document.activeElement.checkVisibility()")
@@ -418,7 +424,7 @@ def test_a_reference_shows_what_it_leads_to(window):
     stays a link."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    laid_out(tab, "comparison")
+    laid_out(tab, "course/comparison")
     box = tab.locator("#kf-preview")
     formula = tab.locator('article a.reference.internal[href^="#equation-"]').first
     figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
@@ -455,7 +461,7 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
     """From another page, and on the same one; on paper all is open (below)."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    page, name = (HTML / "literature.html").as_uri(), "fig-literature-bearings"
+    page, name = (HTML / "beyond/literature.html").as_uri(), "fig-literature-bearings"
     tab.goto(page)
     folds = tab.locator("details.kf-more")
     assert folds.count() == 4 and not any(folds.evaluate_all("all => all.map((e) => e.open)"))
@@ -497,7 +503,7 @@ COME_TO_REST = """(name) => new Promise((rest) => {
 })"""
 
 
-@pytest.mark.parametrize("page", ["comparison", "manual/b-aof"])
+@pytest.mark.parametrize("page", ["course/comparison", "manual/b-aof"])
 def test_contents_on_a_telephone(browser, page):
     """They cover the text, a link closes them, and it arrives."""
     with browser.new_context(offline=True, viewport={"width": 390, "height": 844}) as context:
@@ -512,7 +518,7 @@ def test_contents_on_a_telephone(browser, page):
         assert not drawer.is_visible()
 
 
-@pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])
+@pytest.mark.parametrize("page", [WHOLE, "course/comparison", "manual/r-loop"])
 def test_a_formula_stays_with_its_comma(page):
     """And with its bracket: no text that begins behind a formula begins with a mark."""
     html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
@@ -583,11 +589,13 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
     matched = re.search(
-        r'class="kf-count" href="(equations[^"#]*.html)#([^"]+)"',
+        r'class="kf-count" href="([^"#]*equations[^"#]*.html)#([^"]+)"',
         (HTML / f"{page}.html").read_text(encoding="utf-8"),
     )
     if matched:
-        assert f'id="{matched[2]}"' in (HTML / matched[1]).read_text(encoding="utf-8")
+        assert f'id="{matched[2]}"' in (HTML / page).parent.joinpath(matched[1]).read_text(
+            encoding="utf-8"
+        )
 
 
 def displayed(page: str) -> list[str]:
@@ -606,7 +614,7 @@ def displayed(page: str) -> list[str]:
 
 def test_the_pages_of_all_equations_have_them_all():
     """Whether typed, verified, or printed from the package: numbered or not."""
-    known = set(displayed("equations")) | set(displayed("equations-beyond"))
+    known = set(displayed("reference/equations")) | set(displayed("reference/equations-beyond"))
     assert [
         (page, each) for page in NOTEBOOKS for each in displayed(page) if each not in known
     ] == []
@@ -616,7 +624,7 @@ def test_the_pages_of_all_equations_have_them_all():
 
 def test_a_chapter_is_downloaded_as_a_notebook(window):
     tab, _ = window
-    tab.goto((HTML / "ten-minutes.html").as_uri())
+    tab.goto((HTML / "course/ten-minutes.html").as_uri())
     with tab.expect_download() as started:
         tab.get_by_role("link", name="notebook").click()
     notebook = nbformat.read(started.value.path(), as_version=4)
@@ -629,7 +637,7 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
     code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
     assert code == [
         cell.source
-        for cell in nbformat.read(EXECUTED / "ten-minutes.ipynb", 4).cells
+        for cell in nbformat.read(EXECUTED / "course" / "ten-minutes.ipynb", 4).cells
         if cell.cell_type == "code"
     ]
 
@@ -637,13 +645,17 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
 @pytest.mark.parametrize(
     ("words", "page", "section"),
     [
-        ("stratonovich equation", "stratonovich.html", ""),
+        ("stratonovich equation", "course/stratonovich.html", ""),
         ("variant 53 Russian report", "sample-report.html", ""),
-        ("что такое невязки", "glossary.html", "term-innovation"),  # which says "невязка"
-        ("what is the DUOF", "glossary.html", "term-two-step-conditionally-optimal-filter"),
-        ("why does the EKF diverge", "glossary.html", "term-extended-kalman-filter"),
-        ("alpha-beta", "radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
-        ("likelihood", "what-the-data-say.html", "likelihood-from-innovations"),
+        ("что такое невязки", "reference/glossary.html", "term-innovation"),  # which says "невязка"
+        (
+            "what is the DUOF",
+            "reference/glossary.html",
+            "term-two-step-conditionally-optimal-filter",
+        ),
+        ("why does the EKF diverge", "reference/glossary.html", "term-extended-kalman-filter"),
+        ("alpha-beta", "course/radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
+        ("likelihood", "beyond/what-the-data-say.html", "likelihood-from-innovations"),
         ("smoothing_error", "package/kfcourse.records.html", "module-kfcourse.records.smoothing"),
     ],
 )
@@ -684,7 +696,7 @@ def test_an_address_that_does_not_exist(window):
         assert Path(unquote(urlsplit(address).path)).exists(), address
 
 
-@pytest.mark.parametrize("page", ["intro", "stratonovich", "manual/b-aof"])
+@pytest.mark.parametrize("page", ["intro", "course/stratonovich", "manual/b-aof"])
 def test_descriptions_and_icon(page):
     head = (HTML / f"{page}.html").read_text(encoding="utf-8").split("</head>")[0]
     for name in ("description", "og:title", "og:description", "og:type"):

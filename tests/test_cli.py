@@ -53,7 +53,7 @@ def no_computation(monkeypatch):
     def never(*_, **__):
         raise AssertionError("the computation began")
 
-    monkeypatch.setattr(cli, "without_failing", never)
+    monkeypatch.setattr(cli, "compare", never)
 
 
 @pytest.fixture
@@ -127,9 +127,13 @@ def test_help_and_version(call, option):
 
 
 def test_the_lab_of_variant_53(call, tmp_path):
-    result = call("lab", "53", "--runs", 1000, "--steps", 12, "--out", "report", "--json", "n.json")
+    sizes = ("--runs", 1000, "--steps", 12, "--scores")
+    result = call("lab", "53", *sizes, "--out", "report", "--json", "n.json")
     assert result.exit_code == 0, result.output
     assert "is more accurate than" in result.output
+    scores = result.output.split("CRPS\n")[1].splitlines()
+    # the exact law is not normal
+    assert {line.split()[0] for line in scores if line.endswith("–")} == {"exact"}
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     names = {*LAB, "aof-exact"}
     for key in ("error_variance", "standard_error"):
@@ -145,6 +149,7 @@ def test_the_lab_of_variant_53(call, tmp_path):
     assert str(Path("report") / "report.html") in result.output
 
 
+@pytest.mark.slow
 def test_every_filter_can_be_chosen(call, no_report, tmp_path):
     result = call("lab", "53", *QUICK, "--filters", ",".join(FILTERS), "--json", "n.json")
     assert result.exit_code == 0, result.output
@@ -153,7 +158,7 @@ def test_every_filter_can_be_chosen(call, no_report, tmp_path):
     ) == set(FILTERS)
 
 
-def test_a_vector_variant_works(call, tmp_path):
+def test_a_vector_variant_works(call, no_figures, tmp_path):
     """Without a bound, unless it is asked for: that is one of particles."""
     for options, names, bounded in (((), {*LAB}, False), (("--bound",), {*LAB, "aof-exact"}, True)):
         result = call("lab", "20", *QUICK, *options, "--json", "n.json")
@@ -242,15 +247,15 @@ def test_what_is_no_derivation_is_said_in_a_sentence(call, tmp_path, content, op
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "says"),
     [
         ("lab 999", ["'999'", "53, 1, 2"]),
         ("lab 53 --filters duof,ekf", ["'ekf'", *FILTERS]),
         *((f"lab 53 --filters '{names}'", ["at least one filter"]) for names in ("", ",", " , ")),
         *(
-            (f"{command} --variants {file}", said)
+            (f"{command} --variants {file}", says)
             for command in ("variants", "lab 53")
-            for file, said in (
+            for file, says in (
                 ("nothing.toml", ["nothing.toml"]),
                 ("bad.toml", ["bad.toml", "not valid TOML"]),
                 (".", ["no file of variants"]),
@@ -264,10 +269,10 @@ def test_what_is_no_derivation_is_said_in_a_sentence(call, tmp_path, content, op
     ],
 )
 def test_what_cannot_be_done_is_refused_before_the_computation(
-    call, no_computation, tmp_path, words, said
+    call, no_computation, tmp_path, words, says
 ):
     (tmp_path / "bad.toml").write_text("[variants.53", encoding="utf-8")
-    refused(call(*shlex.split(words)), *said)
+    refused(call(*shlex.split(words)), *says)
 
 
 def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):

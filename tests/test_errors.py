@@ -22,7 +22,7 @@ from kfcourse import (
     run,
     smooth,
 )
-from kfcourse.filters import aof, duof, gated
+from kfcourse.filters import aof, duof
 
 pytestmark = pytest.mark.quick
 
@@ -49,7 +49,6 @@ Y = np.zeros(3)
             lambda: likelihood(duof(MODEL), Y),
             r"^likelihood expects a Filter, got Design duof: .* design",
         ),
-        (lambda: gated(Y), r"^gated expects a Filter, got ndarray: give a filter"),
         (lambda: predictions(aof, Y), r"^a run expects a Filter, got function aof: give a filter"),
         (
             lambda: gaussian(FILTER),
@@ -57,8 +56,8 @@ Y = np.zeros(3)
         ),
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
         (
-            lambda: design([FILTER], Ensemble(MODEL, 10, 2, 1)),
-            r"^design expects a Design, got Filter",
+            lambda: design([MODEL], Ensemble(MODEL, 10, 2, 1)),
+            r"^design expects a Design, got Model",
         ),
         (
             lambda: compare([FILTER, MODEL], MODEL, 10, 2, 1),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_normal
 
 from kfcourse.filters.designed import Scatter
@@ -37,7 +38,7 @@ def test_among_many_matrices_a_singular_broken_or_unknown_one_does_not_disturb_t
     expected, others = gain(cross, cov), np.arange(9) != 7
     for bad in (np.diag([1.0, 0.0, 2.0]), np.ones((3, 3)), -np.eye(3), np.full((3, 3), np.nan)):
         cov[7] = bad
-        np.testing.assert_allclose(
+        assert_allclose(
             gain(cross, cov, broken=True)[others], expected[others], rtol=1e-10, atol=1e-10
         )
     with pytest.raises(NegativeVariance):
@@ -62,7 +63,7 @@ def test_a_covariance_that_is_singular_but_for_rounding_is_singular(rounding):
     cov = np.array([[1.0, 2.0], [2.0, 4.0 * (1 + rounding)]])
     K = gain(np.array([[1.0, 2.0]]), cov)
     # The rounding, 5e-15, against the variance 2 of the sum of the standardised pair.
-    np.testing.assert_allclose(K * [1, 2], np.full((1, 2), 0.5), rtol=1e-12)
+    assert_allclose(K * [1, 2], np.full((1, 2), 0.5), rtol=1e-12)
 
 
 def measurement(G, R, prior):
@@ -79,10 +80,8 @@ def test_the_correction_is_the_conditional_law(rng, n, p):
     information = np.linalg.inv(prior.cov) + transpose(G) @ np.linalg.inv(R) @ G
     cov = np.linalg.inv(information)
     gained = cov @ transpose(G) @ np.linalg.inv(R)
-    np.testing.assert_allclose(posterior.cov, cov, rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(
-        posterior.mean, prior.mean + apply(gained, y), rtol=1e-10, atol=1e-10
-    )
+    assert_allclose(posterior.cov, cov, rtol=1e-10, atol=1e-10)
+    assert_allclose(posterior.mean, prior.mean + apply(gained, y), rtol=1e-10, atol=1e-10)
     assert np.array_equal(posterior.cov, transpose(posterior.cov))
 
 
@@ -94,8 +93,8 @@ def test_a_meter_that_sees_nothing_leaves_the_prior(rng, n, p):
         np.zeros((3, p)), np.zeros((3, p, n)), np.zeros((3, p, p)), np.zeros((3, p, p))
     )
     posterior = correct(prior, blind, np.ones((3, p)))
-    np.testing.assert_array_equal(posterior.mean, prior.mean)
-    np.testing.assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
+    assert_array_equal(posterior.mean, prior.mean)
+    assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
 
 
 @pytest.mark.parametrize("sharpness", [1e-8, 1e-16, 1e-24])
@@ -107,9 +106,7 @@ def test_a_sharp_meter_leaves_a_positive_variance_with_its_digits(sharpness, n):
     expected = sharpness / (1 + sharpness)
     # Joseph's form adds (1 - K)^2 Psi, K rounded to 1e-16: an absolute 1e-32 beside the 1e-24 of
     # the sharpest.
-    np.testing.assert_allclose(
-        posterior.cov[0], expected * np.eye(n), rtol=1e-7, atol=1e-7 * sharpness
-    )
+    assert_allclose(posterior.cov[0], expected * np.eye(n), rtol=1e-7, atol=1e-7 * sharpness)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +123,7 @@ def test_a_sharp_meter_leaves_a_positive_variance_with_its_digits(sharpness, n):
 def test_the_square_root_squares_to_the_covariance(cov):
     root = square_root(cov)
     # rounding relative to the largest eigenvalue
-    np.testing.assert_allclose(root @ root.T, cov, atol=1e-15 * 2)
+    assert_allclose(root @ root.T, cov, atol=1e-15 * 2)
 
 
 @pytest.mark.parametrize(("r", "s"), [(1, 1), (2, 1), (1, 2), (2, 3)])
@@ -138,26 +135,26 @@ def test_a_regression_is_least_squares(rng, r, s):
     assert np.array_equal(Scatter.of(target, regressor).regression(r).matrix, fit.matrix)
     design = np.column_stack([regressor, np.ones(60)])
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
-    np.testing.assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(fit.offset, solution[s], rtol=1e-9, atol=1e-9)
+    assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)
+    assert_allclose(fit.offset, solution[s], rtol=1e-9, atol=1e-9)
     residual = target - design @ solution
-    np.testing.assert_allclose(fit.residual, residual.T @ residual / 60, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(fit(regressor), design @ solution, rtol=1e-9, atol=1e-9)
+    assert_allclose(fit.residual, residual.T @ residual / 60, rtol=1e-9, atol=1e-9)
+    assert_allclose(fit(regressor), design @ solution, rtol=1e-9, atol=1e-9)
 
 
 def test_large_means_do_not_cancel(rng):
     target, regressor = rng.normal(size=(60, 2)) + 1e6, rng.normal(size=(60, 2)) - 1e5
-    found = Scatter.of(target, regressor).scatter
+    scatter = Scatter.of(target, regressor).scatter
     # Means of size 1e6 are rounded to 1e-10; deviations from them are of order 1.
-    np.testing.assert_allclose(
-        found, 60 * np.cov(np.hstack([target, regressor]).T, bias=True), rtol=1e-7, atol=1e-7
+    assert_allclose(
+        scatter, 60 * np.cov(np.hstack([target, regressor]).T, bias=True), rtol=1e-7, atol=1e-7
     )
 
 
 @pytest.mark.parametrize("count", [8191, 8192, 8193, 20_000])
 def test_long_sums_are_cut_without_loss(rng, count):
     column = rng.normal(size=(count, 1))
-    np.testing.assert_allclose(
+    assert_allclose(
         Scatter.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11
     )
 

@@ -27,7 +27,7 @@ def say(app, doctree) -> None:
     """Put the words where the reader looks for them."""
     page = Path(app.srcdir, f"{app.env.docname}.md")
     # say so themselves; is given by a task, for any variant
-    if page.stem in (COURSE, BEYOND) or app.env.docname.startswith("manual/"):
+    if app.env.docname in (COURSE, BEYOND) or app.env.docname.startswith("manual/"):
         return
     letters = letters_of(page)
     app.env.note_dependency(str(letters_file(page)))

@@ -28,7 +28,7 @@ from sphinx import addnodes
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
-from kfcourse.checks import sets
+from kfcourse.exercises.checks import sets
 
 log = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ def _items(app, name: str, line: chapter_line):
     executed = Path(app.outdir).parent / "jupyter_execute" / f"{name}.ipynb"
     if executed.exists():
         notebook = nbformat.read(executed, as_version=4)
-        yield embedded(f"{name}.ipynb", nbformat.writes(plain(notebook)).encode(), "↓ notebook")
+        yield embedded(executed.name, nbformat.writes(plain(notebook)).encode(), "↓ notebook")
         count = sum(record["equations"] for record in records(notebook))
         place = f"{app.builder.get_relative_uri(name, page_of(name))}#{place_of(name)}"
         yield (

@@ -20,7 +20,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from ext.figures import ancestors
 
-PAGE = "glossary"
+PAGE = "reference/glossary"
 GLOSSARY = Path(__file__).resolve().parents[1] / "glossary.toml"
 RUSSIAN = re.compile(r"[а-яё]", re.IGNORECASE)
 NOT_LINKED = (
@@ -145,8 +145,8 @@ class FirstUses(SphinxPostTransform):
 
     def run(self, **kwargs) -> None:
         page = self.env.docname
-        without = (PAGE, COURSE, BEYOND, "references", self.config.root_doc)
-        if page in without or page.startswith(("package/", "api")):
+        without = (PAGE, COURSE, BEYOND, "reference/references", self.config.root_doc)
+        if page in without or page.startswith(("package/", "reference/api")):
             return
         own = [term for term in terms() if term.page == page]
         linked = {term.name for term in own}

@@ -246,12 +246,12 @@ def _without_scripts(piece: str) -> str:
 
 def letters_file(page: Path) -> Path:
     """Where a page has its letters."""
-    return page.parent / "letters" / f"{page.stem.replace('-', '_')}.py"
+    return Path(__file__).parents[1] / "letters" / f"{page.stem.replace('-', '_')}.py"
 
 
 @cache
 def letters_of(page: Path) -> Letters:
-    """The letters of a page, from the folder `letters` beside it; none if it has no file there."""
+    """The letters of a page, from the folder `letters`; none if it has no file there."""
     path = letters_file(page)
     if not path.exists():
         return Letters()

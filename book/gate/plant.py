@@ -4,7 +4,7 @@ r"""Plants changes in the relations that the book displays, and counts what noth
     python -m gate.plant                each typed relation of each page, changed in each way it can
                                         be: by chapter and kind
     python -m gate.plant --seed 7       other places of the changes
-    python -m gate.plant grid --show    one chapter, and each change that nothing noticed
+    python -m gate.plant beyond/grid --show    one chapter, and each change that nothing noticed
 
 A change is a sign, a factor, an index, or a transposition.  It is noticed if the relation no longer
 holds, or is no longer what the page's file in book/letters/ says (gate.page).  More than 5 %
@@ -25,15 +25,22 @@ from typing import Any, NamedTuple
 
 import jupytext
 import numpy as np
+from equations import BEYOND, COURSE
 
 from gate.page import Formula, Letters, formulas, letters_of, outside_points
 from gate.tex import is_relation, normal, pieces
 from kfcourse.pages import Unverified
 
 BOOK = Path(__file__).resolve().parents[1]
-MADE = BOOK / "equations.md"  # by the build
+FOLDERS = "", "course", "beyond", "reference"
+MADE = {BOOK / f"{name}.md" for name in (COURSE, BEYOND)}  # by the build
 MOST = 0.05
 KINDS = ("sign", "factor", "index", "transposition")
+
+
+def written() -> list[Path]:
+    """The pages of the book that somebody has written."""
+    return sorted({page for name in FOLDERS for page in (BOOK / name).glob("*.md")} - MADE)
 
 
 class Planted(NamedTuple):
@@ -201,7 +208,7 @@ def main() -> int:
     parser.add_argument("pages", nargs="*", help="chapters, all without")
     given = parser.parse_args()
     chance = random.Random(given.seed)
-    pages = [BOOK / f"{name}.md" for name in given.pages] or sorted(set(BOOK.glob("*.md")) - {MADE})
+    pages = [BOOK / f"{name}.md" for name in given.pages] or written()
     changes = [entry for page in pages for entry in planted(page, chance)]
     for entry in changes:
         if given.show and not entry.noticed:

@@ -9,7 +9,7 @@ from gate.values import Indexed
 from kfcourse import Model
 
 CODE = "\n".join(
-    cells(Path(__file__).parents[1].joinpath("ten-minutes.md").read_text(encoding="utf-8"))
+    cells(Path(__file__).parents[1].joinpath("course/ten-minutes.md").read_text(encoding="utf-8"))
 )
 
 

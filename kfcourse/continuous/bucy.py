@@ -62,10 +62,8 @@ def extended_kalman_bucy(
     name = "kalman-bucy" + "-second" * second_derivatives + "-symmetrised" * symmetrised
     equations = filter_equations(model, second_derivatives)
     z, D, y = equations.z, equations.D, equations.y
-    arguments = {"z": z, "D": D, "y": y}
-    linear = compiled(
-        model, {"z": z}, {key: getattr(equations, key) for key in "fAQSH"}, ["z", "f", "S"]
-    )
+    parts = [list(equations.f), equations.A, equations.Q, list(equations.S), equations.H]
+    linear = compiled(model, [list(z)], parts)
     W = equations.U - without_noise(equations.U, y, equations.S)
     intensity = exact_matrix(model.noise_density) / 2
     slopes = [W.diff(component) for component in y]  # W is linear in y
@@ -77,9 +75,9 @@ def extended_kalman_bucy(
     if symmetrised:
         added = symmetrised_drift(equations.rates, equations.state, list(y), intensity)
     by_state = dict(zip(equations.state, added, strict=True))
-    outputs = {"W": W, "V": V, "dz": z.applyfunc(by_state.get), "dD": D.applyfunc(by_state.get)}
+    outputs = [W, V, [by_state[component] for component in z], D.applyfunc(by_state.get)]
     second = (
-        compiled(model, arguments, outputs, ["z", "y", "dz"])
+        compiled(model, [list(z), D, list(y)], outputs)
         if second_derivatives or symmetrised
         else None
     )

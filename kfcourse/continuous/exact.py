@@ -92,6 +92,10 @@ class Underway(NamedTuple):
         """As of `PointMass`."""
         return self.posterior.density(run)
 
+    def drawn(self, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """As of `PointMass`."""
+        return self.posterior.drawn(number, rng)
+
 
 def by_substeps(
     model: Model, accuracy: float, clock: Callable[[int], tuple[float, Callable[[float], Array]]]
@@ -170,7 +174,10 @@ def by_substeps(
             ) from None
         return State(k + 1, now.posterior, after.ahead.predicted, after)
 
-    return Filter("aof-exact", model, init, step, evidence=evidence)
+    return Filter(
+        "aof-exact", model, init, step, evidence=evidence,
+        drawn=lambda state, *how: state.memory.drawn(*how),
+    )  # fmt: skip
 
 
 def evidence(before: State, y: Array, after: State) -> Array:

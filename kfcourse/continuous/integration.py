@@ -133,12 +133,8 @@ def rates_of(
     n = model.n
     if derived is not None:
         z, p, *rates = derived
-        outputs = {
-            name: part.subs(model.values)
-            for name, part in zip(("drift", "A", "Q"), rates, strict=True)
-        }
-        arguments = {"known": sp.Matrix(model.known.symbols), "z": z, "p": p}
-        return compile_function("rates", arguments, outputs, ["known", "z", "drift"]).function
+        drift, A, Q = (part.subs(model.values) for part in rates)
+        return compile_function([model.known.symbols, list(z), p], [list(drift), A, Q])
     structure = approximation(_seen(model))
 
     def by_points(known: Any, z: Vectors, p: Matrices) -> tuple[Array, ...]:

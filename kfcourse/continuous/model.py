@@ -12,7 +12,7 @@ import sympy as sp
 
 from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.codegen import Entries, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
@@ -259,15 +259,12 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
 
 
 def compiled(
-    model: ContinuousModel, arguments: dict[str, Any], outputs: dict[str, Any], vectors: list[str]
+    model: ContinuousModel, arguments: Sequence[Entries], outputs: Sequence[Entries]
 ) -> Callable[..., Any]:
     """The generated function of the time and these arguments."""
-    numeric = {
-        name: sp.ImmutableMatrix(matrix.subs(model.values)) for name, matrix in outputs.items()
-    }
-    if model.time is not None:
-        arguments = {**arguments, "t": sp.Matrix([model.time])}
-    function = compile_function("continuous", arguments, numeric, [*vectors, "t"]).function
+    numeric = [sp.Array(entries).subs(model.values) for entries in outputs]
+    time = [] if model.time is None else [[model.time]]
+    function = compile_function([*arguments, *time], numeric)
     return (
         (lambda t, *arrays: function(*arrays))
         if model.time is None

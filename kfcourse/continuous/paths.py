@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel, check_step, compiled
 from kfcourse.errors import expect, expect_sizes
@@ -53,8 +52,8 @@ def simulate(
     check_step(step)
     expect_sizes(steps=steps, runs=runs, substeps=substeps)
     rng, dt = np.random.default_rng(seed), step / substeps
-    formulas = {"f": model.drift, "g": model.diffusion, "S": model.signal}
-    equations = compiled(model, {"x": sp.Matrix(model.x)}, formulas, ["x", "f", "S"])
+    formulas = [list(model.drift), model.diffusion, list(model.signal)]
+    equations = compiled(model, [model.x], formulas)
     xi_root, n_root = (
         square_root(model.spectral_density * dt / 2),
         square_root(model.noise_density / (2 * dt)),

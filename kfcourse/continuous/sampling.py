@@ -130,16 +130,9 @@ class Between:
         dx = a dt + B dw, then x' = x + (a(x, t) + a(x + dx, t + dt)) dt / 2 + B(x, t) dw: of strong
         order 1 and weak order 2 if B is constant, 1/2 and 1 if it depends on x.
         """
-        arguments = {"x": sp.Matrix(model.x), "known": sp.Matrix(model.known.symbols)}
-        drift, diffusion = (
-            compile_function(
-                "motion", arguments, {"rate": part.subs(model.values)}, vectors
-            ).function
-            for part, vectors in (
-                (self.drift, ["x", "known", "rate"]),
-                (self.diffusion, ["x", "known"]),
-            )
-        )
+        a, B = (part.subs(model.values) for part in (self.drift, self.diffusion))
+        drift = compile_function([model.x, model.known.symbols], [list(a)])
+        diffusion = compile_function([model.x, model.known.symbols], [B])
 
         def motion(x: Array, noise: Array, k: int | None = None) -> Array:
             span, now = clock(model.known, k or 0)

@@ -83,7 +83,7 @@ def alpha_beta(model: Model, alpha: float, beta: float) -> Filter:
     Parameters
     ----------
     model : Model
-        `kfcourse.scenarios.radar.kinematic(..., order=1)`, or equal to it in all but the noises.
+        `kfcourse.scenarios.radar.kinematic(...)`, or equal to it in all but the noises.
         Its prior is not used.
     alpha, beta : float
         The gain comes to (alpha, beta/T).
@@ -163,7 +163,7 @@ def _interval(model: Model, A: Array, H: Array) -> float:
     ):
         raise ModelError(
             f"{model} is not position, velocity on each axis with the position measured; build it "
-            f"with kinematic(interval, order=1, ...)"
+            f"with kinematic(interval, ...)"
         )
     return T
 

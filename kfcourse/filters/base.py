@@ -59,6 +59,14 @@ class Evidence(Protocol):
     def __call__(self, before: State, y: Vectors, after: State, /) -> Array: ...
 
 
+class Draw(Protocol):
+    """So many states from each posterior, (number, runs, n), and their modes (number, runs)."""
+
+    def __call__(
+        self, state: State, number: int, rng: np.random.Generator, /
+    ) -> tuple[Array, Array]: ...
+
+
 class LookBack(Protocol):
     """From the filter's states after each measurement, and y: what so many of these measurements
     tell, K -> states.
@@ -103,6 +111,8 @@ class Filter:
     mixture : callable, optional
         Where what it expects of a measurement is a mixture of normal laws: the state before it to
         their weights (runs, M), and the M expectations.
+    drawn : Draw, optional
+        Where it is another law, and its posterior can be drawn from.
     """
 
     name: str
@@ -114,6 +124,7 @@ class Filter:
     evidence: Evidence | None = None
     look_back: LookBack | None = None
     mixture: Callable[[State], tuple[Array, Sequence[Measurement]]] | None = None
+    drawn: Draw | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

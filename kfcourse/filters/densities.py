@@ -79,7 +79,6 @@ def transition(model: Model) -> Callable[..., Gaussian]:
     is none."""
     law = _compiled(
         model,
-        "transition",
         _law(model, "object", model.difference_equation("a density"), model.v, model.state_noise),
     )
     return lambda x, k=None: Gaussian(*law.at(k)(x))
@@ -94,9 +93,7 @@ def likelihood(model: Model) -> LogLikelihood:
     """
     if omega := noise_of_meter(model):
         return _of_solved(model, omega)
-    law = _compiled(
-        model, "likelihood", _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
-    )
+    law = _compiled(model, _law(model, "meter", model.meter_equation, model.w, model.meter_noise))
     if model.p > 1 and _singular(law, model):
         raise _no_density(
             f"{list(model.meter_equation)}: the noises of these components depend on one another, "
@@ -178,10 +175,9 @@ def _law(
     return mean, cov
 
 
-def _compiled(model: Model, name: str, law: tuple[sp.MatrixBase, sp.MatrixBase]) -> Stepwise:
-    mean, cov = (part.subs(model.values) for part in law)
-    arguments, outputs = {"x": sp.Matrix(model.x)}, {"mean": mean, "cov": cov}
-    return Stepwise.compile(model.known, name, arguments, outputs, ["x", "mean"])
+def _compiled(model: Model, law: tuple[sp.MatrixBase, sp.MatrixBase]) -> Stepwise:
+    mean, cov = law
+    return model.compiled([model.x], [list(mean), cov])
 
 
 def _singular(law: Stepwise, model: Model) -> bool:

@@ -146,7 +146,6 @@ class Design:
     name: str
     model: Model
     equations: Callable[[State, Vectors], Equations]
-    slow: bool = False
     start: Init | None = None
     structure: Structure | None = None
 

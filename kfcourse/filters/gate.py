@@ -55,12 +55,18 @@ class Gate(NamedTuple):
         Which components passed.
     inner : object
         The memory of the filter behind the gate.
+    edge : float
+        With which probability the gate lets pass.
+    by_component : bool
+        Whether it judges each component for itself.
     """
 
     weight: Array
     in_a_row: Array
     passed: Array
     inner: Any
+    edge: float
+    by_component: bool
 
 
 def gated(
@@ -135,16 +141,16 @@ def gated(
             variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
             size, limit = expected.innovation(y) ** 2 / variances, limits[[1]]
         else:
-            size, limit = _size(expected, y)[:, None], limits[(~np.isnan(y)).sum(axis=-1)][:, None]
+            size = size_of(expected.innovation(y), expected.F)[:, None]
+            limit = limits[(~np.isnan(y)).sum(axis=-1)][:, None]
         lost = patience is not None and state.memory.in_a_row >= patience
         return expected, size, limit, (size > limit) & ~np.asarray(lost)[..., None]
 
     def init(runs: int) -> State:
         state = filter_.init(runs)
-        nothing = np.zeros((runs, filter_.model.p), dtype=bool)
-        return state._replace(
-            memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), nothing, state.memory)
-        )
+        nothing, none = np.zeros((runs, filter_.model.p), dtype=bool), np.zeros(runs, dtype=int)
+        memory = Gate(none + np.nan, none, nothing, state.memory, probability, by_component)
+        return state._replace(memory=memory)
 
     def step(state: State, y: Array) -> State:
         expected, _, _, beyond = judged(state, y)
@@ -155,15 +161,15 @@ def gated(
             missing, np.nan, passed.sum(axis=-1) / np.maximum(measured.sum(axis=-1), 1)
         )
         refused = weight == 0
-        in_a_row = np.where(
-            missing, state.memory.in_a_row, np.where(refused, state.memory.in_a_row + 1, 0)
-        )
+        before = state.memory.in_a_row
+        in_a_row = np.where(missing, before, (before + 1) * refused)
         if patience is not None and (losing := refused & (in_a_row == patience)).any():
             wider = np.where(losing, _widening(expected, state.predicted, y), 1.0)
             after = after._replace(
                 predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None])
             )
-        return after._replace(memory=Gate(weight, in_a_row, passed, after.memory))
+        memory = Gate(weight, in_a_row, passed, after.memory, probability, by_component)
+        return after._replace(memory=memory)
 
     def evidence(before: State, y: Array, after: State) -> Array:
         expected, size, limit, beyond = judged(before, y)
@@ -186,11 +192,10 @@ def gated(
     )
 
 
-def _size(expected: Measurement, y: Array) -> Array:
+def size_of(innovation: Array, F: Array) -> Array:
     """nu^T F^-1 nu of what was measured, (runs,)."""
-    innovation, F = expected.innovation(y), expected.F
     if any_missing(innovation):
-        innovation, _, F, _ = without_missing(innovation, expected.G, F, expected.R)
+        innovation, _, F, _ = without_missing(innovation, np.zeros_like(F), F, F)
     return normalised_square(innovation, F)
 
 

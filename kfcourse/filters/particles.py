@@ -111,6 +111,14 @@ class Clouds:
         """Random numbers of the part, the same for the same `entropy`."""
         return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=self.part))
 
+    def drawn(self, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """As of `Filter`."""
+        assert self.x is not None and self.mode is not None  # there has been a measurement
+        runs, _, size = self.mode.shape
+        shape = (number, runs)
+        which = np.arange(runs), rng.integers(2, size=shape), rng.integers(size, size=shape)
+        return self.x[which], self.mode[which]
+
     def discretisation_error(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
         return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=-1))
@@ -163,8 +171,9 @@ def particle(
     sampler = Sampler([*map(Mode.of, modes)], jumping, particles // 2, seed, guided)
     back = sampler.look_back if jumping is None else None
     return Filter(
-        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, look_back=back
-    )
+        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, look_back=back,
+        drawn=lambda state, *how: state.memory.drawn(*how),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

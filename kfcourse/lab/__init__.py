@@ -7,7 +7,6 @@ families     what each family of filters is called, in both languages, and how i
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables;  checked_quadrature:
              where there are no formulas
 quality      is a variant well posed?  grammar: new ones, from the pieces of grammar.toml
-maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes, its JSON too, in English or Russian (report.toml);
              report_sections: from the task to the conclusion; report_modes: what is otherwise

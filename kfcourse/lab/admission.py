@@ -186,6 +186,10 @@ def _blind(structures: Structures) -> Iterator[str]:
 def table(answers: Sequence[Admission]) -> str:
     """What `kfcourse filters` prints: a line for each filter."""
     rows = [(answer.name, title(answer.name), answer.verdict, answer.says) for answer in answers]
-    widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:3]]
-    form = "  ".join(f"{{:{width}}}" for width in widths)
-    return "\n".join(f"{form.format(*row)}  {row[3]}".rstrip() for row in rows)
+    return "\n".join(aligned(rows))
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """The lines of a table for terminals."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]

@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.angles import difference
 from kfcourse.errors import ModelError, NoClosedForm, NotFinite
 from kfcourse.filters import aof
 from kfcourse.filters.exact.laws import modes_of
@@ -25,7 +24,7 @@ from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import QuadratureWarning, axes, gauss_hermite
+from kfcourse.symbolic.quadrature import QuadratureWarning, apart, axes, gauss_hermite
 from kfcourse.symbolic.structure import Structure, gaussian
 
 ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
@@ -111,9 +110,5 @@ def _apart(coarse: Structure, fine: Structure) -> float:
     if not np.isfinite(y).all():
         raise NotFinite("trajectories become infinite")
     less, more = (run(aof(structure), y) for structure in (coarse, fine))
-    # what does not vary has no size of its own but that of rounding
-    rounding = 1e-12 * (1 + np.abs(more.mean))
-    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0)) + rounding
-    shift = difference(less.mean, more.mean, model.angles.x) / sd
-    spread = (less.cov - more.cov) / (sd[..., :, None] * sd[..., None, :])
-    return float(np.max([np.sqrt((part**2).mean(axis=1)).max() for part in (shift, spread)]))
+    parts = apart(less, more, model.angles.x)
+    return float(np.max([np.sqrt((part**2).mean(axis=1)).max() for part in parts]))

@@ -1,5 +1,5 @@
 """The families of filters: what each is called, in both languages, and how it is drawn:
-families.toml, a table a family.
+families.toml, a table a family.  The words of reports and figures: report.toml, a table a language.
 
 Filters of a family share its equations (`kfcourse.filters.EQUATIONS`, by the same name), colour and
 marker, and differ in their structural functions (dashes) or in the length of their memory.
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from importlib import resources
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Family(NamedTuple):
@@ -31,12 +31,13 @@ class Family(NamedTuple):
     memory: bool = False
 
 
-FAMILIES: dict[str, Family] = {
-    name: Family(**table)
-    for name, table in tomllib.loads(
-        (resources.files("kfcourse.lab") / "families.toml").read_text(encoding="utf-8")
-    ).items()
-}
+def _read(file: str) -> dict[str, dict[str, Any]]:
+    return tomllib.loads((resources.files("kfcourse.lab") / file).read_text(encoding="utf-8"))
+
+
+FAMILIES = {name: Family(**table) for name, table in _read("families.toml").items()}
+# Of reports and figures, by language.
+WORDS: dict[str, dict[str, str]] = _read("report.toml")
 
 
 def look(name: str) -> tuple[str, str]:

@@ -33,7 +33,6 @@ PIECES = tomllib.loads(
     (resources.files("kfcourse.lab") / "grammar.toml").read_text(encoding="utf-8")
 )
 SCREEN = 10  # a candidate is first tried on that many times fewer trajectories: most are none
-CHUNK = 12  # candidates that are judged at once; of the last ones some are judged in vain
 SHAPES = 50  # up to so many variants all formulas are different; each so many more repeat once more
 PATIENCE = 20  # candidates for each variant wanted, before it is given up
 
@@ -125,7 +124,7 @@ def generate(
     tables = (propose(seed, index) for index in range(PATIENCE * wanted))
     bar = tqdm(desc="generating", total=wanted, unit="variant", disable=None)
     with joblib.Parallel(n_jobs=jobs) as parallel, bar:
-        while len(variants) < wanted and (chunk := list(islice(tables, CHUNK))):
+        while len(variants) < wanted and (chunk := list(islice(tables, jobs))):
             judged = parallel(joblib.delayed(_judge)(table, runs, seed, ask) for table in chunk)
             for table, quality in zip(chunk, judged, strict=True):
                 shape = json.dumps([table["state"], table["meter"]])

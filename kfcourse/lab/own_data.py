@@ -22,8 +22,8 @@ from kfcourse.filters.base import Filter
 from kfcourse.filters.gate import gated
 from kfcourse.lab.report import save_figure, save_texts
 from kfcourse.lab.report_text import lines_of, ranges
-from kfcourse.lab.variants import Variant, VariantError, chosen_variants, find_variant
-from kfcourse.laws import Array, Gaussian
+from kfcourse.lab.variants import MANY, Variant, VariantError, chosen_variants, find_variant
+from kfcourse.laws import Array
 from kfcourse.linear.consistency import Innovations, autocorrelation
 from kfcourse.records.estimation import Likeliest, estimate
 from kfcourse.records.evidence import NoDensity
@@ -40,9 +40,10 @@ STRUCTURES: dict[str, Callable[[Model], Structure]] = {
     "gauss-hermite": gauss_hermite,
 }
 LAGS = 20  # of the autocorrelation
-MANY = 5000  # steps above which curves are stored as points of a picture, not one by one
-NAMED = 40  # refused measurements that the report lists
+PICTURE = 5000  # steps above which curves are stored as a picture, not point by point
 ESTIMATE, SMOOTHED, MEASURED, REFUSED = "#0072B2", "#009E73", "#777777", "#D55E00"
+# What is drawn of the state: ends of names of columns, and colours.
+CURVES = {"estimate": ("", ESTIMATE), "smoothed": ("_smoothed", SMOOTHED)}
 # Of each kind of finding: what it is, and what a bad one says.
 KINDS = {
     "size": (
@@ -77,14 +78,6 @@ class Analysis(NamedTuple):
     def findings(self) -> list[Finding]:
         return findings(self.examined)
 
-    @property
-    def laws(self) -> dict[str, tuple[Gaussian, str]]:
-        """Filtered and smoothed laws, and their colours."""
-        return {
-            "estimate": (self.examined.estimate, ESTIMATE),
-            "smoothed": (self.examined.smoothed, SMOOTHED),
-        }
-
     def says(self) -> list[str]:
         """The result in sentences."""
         steps, y, weight = len(self.record.y), self.record.y[:, 0], self.examined.weight[:, 0]
@@ -97,8 +90,8 @@ class Analysis(NamedTuple):
         if self.gate is not None:
             # with some components at least
             refused = np.flatnonzero(weight < 1) + 1
-            where = ": rows " + ranges(refused[:NAMED].tolist()) if len(refused) else ""
-            more = ", ..." if len(refused) > NAMED else ""
+            where = ": rows " + ranges(refused[:MANY].tolist()) if len(refused) else ""
+            more = ", ..." if len(refused) > MANY else ""
             sentences.append(
                 f"The gate refused {len(refused)} of {steps - missing} measurements{where}{more}."
             )
@@ -179,9 +172,7 @@ def estimate_record(
         likeliest = estimate(record.model, record.y, unknown, positive, build) if unknown else None
         if likeliest:
             record = record._replace(model=likeliest.model)
-        examined = examine(
-            build(record.model), record.y, 1.0 if gate is None else gate, by_component
-        )
+        examined = examine(build(record.model), record.y)
         result = Analysis(variant, record, structure, gate, likeliest, examined)
     except NoDensity as error:
         raise RecordError(
@@ -191,7 +182,7 @@ def estimate_record(
             "to it (--gate refuses those out "
             "of all bounds) and at the formulas, and give every component of the meter a noise"
         ) from None
-    for law, _ in result.laws.values():
+    for law in (examined.estimate, examined.smoothed):
         finite = np.isfinite(law.mean).all(axis=(1, 2)) & np.isfinite(law.cov).all(axis=(1, 2, 3))
         if not finite.all():
             k = int(np.argmin(finite))
@@ -204,32 +195,46 @@ def estimate_record(
     return result
 
 
+def columns_of(result: Analysis) -> dict[str, Array]:
+    """What the file of numbers has, and what figures show: a number for each row of the record."""
+    model, examined, columns = result.record.model, result.examined, {}
+    nu = examined.innovations
+    for i, symbol in enumerate(model.x):
+        for key, law in (("", examined.estimate), ("_smoothed", examined.smoothed)):
+            columns[symbol.name + key] = law.mean[:, 0, i]
+            columns[f"{symbol.name}{key}_sd"] = np.sqrt(law.cov[:, 0, i, i])
+    for i, name in enumerate(model.measured):
+        columns[f"{name}_innovation"] = nu.value[:, 0, i]
+        columns[f"{name}_innovation_sd"] = np.sqrt(nu.cov[:, 0, i, i])
+    weight, likelihood = examined.weight[:, 0], examined.log_likelihood[:, 0]
+    return columns | {"weight": weight, "log_likelihood": likelihood}
+
+
 def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None = None) -> None:
     """Write estimate.csv, report.html and the figures, all of them or none."""
-    model = result.record.model
-    names = [symbol.name for symbol in model.x]
+    model, times, columns = result.record.model, result.record.times, columns_of(result)
     pictures: dict[str, tuple[str, Callable[[Axes], None]]] = {}
     if track:
-        places = [*map(names.index, track)]
         about = f"The track: {track[1]} against {track[0]}."
-        pictures["track"] = about, partial(_track, result, places)
-    for i, name in enumerate(names):
+        pictures["track"] = about, partial(_track, columns, track)
+    for name in [symbol.name for symbol in model.x]:
         about = (
             f"{name}: the estimate with a band of two standard deviations, and smoothed, given the "
             "whole record."
         )
-        pictures[f"state-{name}"] = about, partial(_component, result, i)
-    for i, name in enumerate(model.measured):
+        pictures[f"state-{name}"] = about, partial(_component, times, columns, name)
+    for name, passed in zip(model.measured, result.examined.passed[:, 0].T, strict=True):
         about = (
             f"Innovations of {name} between bounds of two standard deviations; 95 of 100 lie "
             "within if the filter is right."
         )
-        pictures[f"innovations-{name}"] = about, partial(_innovations, result, i)
+        of = (columns, name, passed)
+        pictures[f"innovations-{name}"] = about, partial(_innovations, times, *of)
         about = (
             f"Correlation of the innovations of {name} with later ones; between the bounds in 95 "
             "of 100 lags if they are white."
         )
-        pictures[f"whiteness-{name}"] = about, partial(_whiteness, result, i)
+        pictures[f"whiteness-{name}"] = about, partial(_whiteness, *of)
     content = {
         "result": result,
         "model": lines_of(model.latex()),
@@ -237,37 +242,19 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
         "unfit": not all(finding.fits for finding in result.findings),
     }
     with replacing_together(folder) as place:
-        write_numbers(result, place / "estimate.csv")
+        with (place / "estimate.csv").open("w", encoding="utf-8", newline="") as file:
+            rows = csv.writer(file, lineterminator="\n")
+            # names of symbols, and numbers: nothing that a spreadsheet takes for a formula
+            rows.writerow(["time", *columns])
+            # times with all their digits: stamps of Unix have ten before the point
+            for time, *row in zip(times.tolist(), *columns.values(), strict=True):
+                rows.writerow(
+                    [time, *("" if np.isnan(value) else f"{value:.10g}" for value in row)]
+                )
         for name, (_, draw) in pictures.items():
             save_figure(draw, place, name)
         save_texts(("record.html",), place, content)
         (place / "record.html").rename(place / "report.html")
-
-
-def write_numbers(result: Analysis, path: Path) -> None:
-    """The CSV file: a row for each row of the record; cells without a number are empty."""
-    model, examined = result.record.model, result.examined
-    nu = examined.innovations
-    columns = {}
-    for i, symbol in enumerate(model.x):
-        for key, law in (("", examined.estimate), ("_smoothed", examined.smoothed)):
-            columns[symbol.name + key] = law.mean[:, 0, i]
-            columns[f"{symbol.name}{key}_sd"] = _deviation(law.cov, i)
-    for i, name in enumerate(model.measured):
-        columns[f"{name}_innovation"] = nu.value[:, 0, i]
-        columns[f"{name}_innovation_sd"] = _deviation(nu.cov, i)
-    columns |= {"weight": examined.weight[:, 0], "log_likelihood": examined.log_likelihood[:, 0]}
-    with path.open("w", encoding="utf-8", newline="") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        # names of symbols, and numbers: nothing that a spreadsheet takes for a formula
-        rows.writerow(["time", *columns])
-        # times with all their digits: stamps of Unix have ten before the point
-        for time, *row in zip(result.record.times.tolist(), *columns.values(), strict=True):
-            rows.writerow([time, *("" if np.isnan(value) else f"{value:.10g}" for value in row)])
-
-
-def _deviation(cov: Array, i: int) -> Array:
-    return np.sqrt(cov[:, 0, i, i])
 
 
 def _labelled(ax: Axes, across: str, up: str) -> None:
@@ -279,53 +266,54 @@ def _labelled(ax: Axes, across: str, up: str) -> None:
 
 def _curve(ax: Axes, x: Array, y: Array, style: str = "-", half: Any = None, **of: Any) -> None:
     """A curve, and a band of so much to both sides; of a long record as a picture."""
-    of["rasterized"] = len(x) > MANY
+    of["rasterized"] = len(x) > PICTURE
     ax.plot(x, y, style, linewidth=1, markersize=4, **of)
     if half is not None:
         band = {"color": of["color"], "rasterized": of["rasterized"]}
         ax.fill_between(x, y - half, y + half, alpha=0.2, linewidth=0, **band)
 
 
-def _component(result: Analysis, i: int, ax: Axes) -> None:
+def _component(times: Array, columns: Mapping[str, Array], name: str, ax: Axes) -> None:
     """A component of the state with its band, and smoothed."""
-    for label, (law, colour) in result.laws.items():
-        half = 2 * _deviation(law.cov, i)
-        _curve(ax, result.record.times, law.mean[:, 0, i], "-", half, color=colour, label=label)
-    _labelled(ax, "time", result.record.model.x[i].name)
+    for label, (key, colour) in CURVES.items():
+        half = 2 * columns[f"{name}{key}_sd"]
+        _curve(ax, times, columns[name + key], "-", half, color=colour, label=label)
+    _labelled(ax, "time", name)
 
 
-def _track(result: Analysis, places: Sequence[int], ax: Axes) -> None:
+def _track(columns: Mapping[str, Array], names: tuple[str, str], ax: Axes) -> None:
     """Two components against each other."""
-    for label, (law, colour) in result.laws.items():
-        _curve(ax, *law.mean[:, 0, places].T, color=colour, label=label)
+    for label, (key, colour) in CURVES.items():
+        x, y = (columns[name + key] for name in names)
+        _curve(ax, x, y, color=colour, label=label)
     ax.set_aspect("equal", adjustable="datalim")
-    _labelled(ax, *(result.record.model.x[i].name for i in places))
+    _labelled(ax, *names)
 
 
-def _innovations(result: Analysis, i: int, ax: Axes) -> None:
+def _innovations(
+    times: Array, columns: Mapping[str, Array], name: str, passed: Array, ax: Axes
+) -> None:
     """Innovations of a component of the meter, and what was expected of them."""
-    times, nu = result.record.times, result.examined.innovations
-    value, two, passed = nu.value[:, 0, i], 2 * _deviation(nu.cov, i), result.examined.passed
+    value, two = columns[f"{name}_innovation"], 2 * columns[f"{name}_innovation_sd"]
     measured = ~np.isnan(value)
-    refused = measured & ~passed[:, 0, i]
+    refused = measured & ~passed
     zero = np.zeros(measured.sum())
     _curve(ax, times[measured], zero, "", two[measured], color=ESTIMATE)
     _curve(ax, times[~refused], value[~refused], ".", color=MEASURED)
     if refused.any():
         _curve(ax, times[refused], value[refused], "x", color=REFUSED, label="refused")
         ax.set_yscale("symlog", linthresh=float(np.nanmax(two)))
-    _labelled(ax, "time", f"innovation of {result.record.model.measured[i]}")
+    _labelled(ax, "time", f"innovation of {name}")
 
 
-def _whiteness(result: Analysis, i: int, ax: Axes) -> None:
+def _whiteness(columns: Mapping[str, Array], name: str, passed: Array, ax: Axes) -> None:
     """Autocorrelation of the innovations that were taken, from each to the next ones; nothing of
     fewer than three."""
-    used, nu = result.examined.passed[:, 0, i], result.examined.innovations
-    if used.sum() >= 3:
-        value, F = nu.value[used][..., [i]], nu.cov[used][..., [i], :][..., [i]]
+    s = (columns[f"{name}_innovation"] / columns[f"{name}_innovation_sd"])[passed, None, None]
+    if len(s) >= 3:
         # as for `findings`: a wrong size alone is no correlation
-        size = np.mean(value**2 / F[..., 0])
-        white = autocorrelation(Innovations(value, size * F), min(LAGS, int(used.sum()) - 1))
+        of_size_1 = Innovations(s, np.mean(s**2) * np.ones((len(s), 1, 1, 1)))
+        white = autocorrelation(of_size_1, min(LAGS, len(s) - 1))
         lags, bound = np.arange(1, len(white.value) + 1), normal_bound() * white.standard_deviation
         _curve(ax, lags, 0 * bound, "", bound, color=ESTIMATE)
         _curve(ax, lags, white.value, "o-", color=MEASURED)

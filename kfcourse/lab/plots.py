@@ -3,36 +3,20 @@ filter."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from kfcourse.lab.families import look
+from kfcourse.lab.families import WORDS, look
 from kfcourse.lab.short_names import entry, title
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised
 from kfcourse.montecarlo.statistics import Estimate
 
-
-class Words(NamedTuple):
-    """What the figures say: the names of filters and the axes, {name} for the filter that is the
-    zero line."""
-
-    title: Callable[[str], str] = title
-    step: str = "step $k$"
-    variance: str = "error variance $D_k$ (units of $x^2$)"
-    above: str = "$D_k$ above {name} (%)"
-    mean_above: str = "mean of $D_k$ above {name} (%)"
-    normalised: str = r"normalised squared error $\mathsf{M}[e^2/p]$"
-    mode: str = "probability of the mode"
-
-
-ENGLISH = Words()
-
-
+ENGLISH = WORDS["en"]
 DASHES = {"linearised": "--", "unscented": ":", "gauss-hermite": "-.", "averaged": ":"}
 
 
@@ -49,9 +33,9 @@ def style(name: str) -> dict[str, Any]:
     }
 
 
-def _labelled(ax: Axes, ylabel: str, words: Words = ENGLISH) -> Axes:
+def _labelled(ax: Axes, ylabel: str, words: Mapping[str, str] = ENGLISH) -> Axes:
     """Axes of steps, which are whole numbers, with their legend."""
-    ax.set_xlabel(words.step)
+    ax.set_xlabel(words["axis_step"])
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_ylabel(ylabel)
     ax.legend(fontsize="small", ncols=2)
@@ -59,41 +43,46 @@ def _labelled(ax: Axes, ylabel: str, words: Words = ENGLISH) -> Axes:
 
 
 def _curve(
-    ax: Axes, name: str, estimate: Estimate, words: Words, band: bool = False, scale: float = 1
+    ax: Axes,
+    name: str,
+    estimate: Estimate,
+    words: Mapping[str, str],
+    band: bool = False,
+    scale: float = 1,
 ) -> None:
     """A filter's estimates over the steps, with a band of confidence if wanted."""
-    line, k = style(name) | {"label": words.title(name)}, np.arange(len(estimate.value))
+    line, k = style(name) | {"label": title(name, words)}, np.arange(len(estimate.value))
     ax.plot(k, scale * estimate.value, markersize=4, markevery=max(1, len(k) // 10), **line)
     if band:
         low, high = estimate.interval()
         ax.fill_between(k, scale * low, scale * high, color=line["color"], alpha=0.15, linewidth=0)
 
 
-def accuracy(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
+def accuracy(result: Comparison, ax: Axes, words: Mapping[str, str] = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
     ax.set_yscale("log")
     for name in result.names:
         _curve(ax, name, result.error_variance(name), words)
     ax.grid(True, which="major", alpha=0.3)
-    return _labelled(ax, words.variance, words)
+    return _labelled(ax, words["axis_variance"], words)
 
 
-def relative_accuracy(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
+def relative_accuracy(result: Comparison, ax: Axes, words: Mapping[str, str] = ENGLISH) -> Axes:
     """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands
     of confidence.
 
     Without the exact AOF the control (the Gaussian AOF) is the zero line.
     """
-    zero = words.title(result.reference)
+    zero = title(result.reference, words)
     for name in result.entrants:
         if name != result.reference:
             _curve(ax, name, result.gap(name), words, True, 100)
     ax.axhline(0, color="black", linewidth=0.8, label=zero)
     ax.grid(True, alpha=0.3)
-    return _labelled(ax, words.above.replace("{name}", zero), words)
+    return _labelled(ax, words["axis_above"].replace("{name}", zero), words)
 
 
-def ranking(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
+def ranking(result: Comparison, ax: Axes, words: Mapping[str, str] = ENGLISH) -> Axes:
     """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best
     on top, with intervals."""
     ranked = result.ranking()[::-1]
@@ -101,14 +90,14 @@ def ranking(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
         line, half = style(name), 100 * float(gap.half_width())
         form, color = line["marker"], line["color"]
         ax.errorbar(100 * float(gap.value), row, xerr=half, fmt=form, color=color, capsize=3)
-    ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
+    ax.set_yticks(range(len(ranked)), [title(name, words) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
-    ax.set_xlabel(words.mean_above.replace("{name}", words.title(result.reference)))
+    ax.set_xlabel(words["axis_mean_above"].replace("{name}", title(result.reference, words)))
     ax.grid(True, axis="x", alpha=0.3)
     return ax
 
 
-def consistency(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
+def consistency(result: Comparison, ax: Axes, words: Mapping[str, str] = ENGLISH) -> Axes:
     """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is
     right; between a half and two, as rare far trajectories reach beyond."""
     for name in result.entrants:
@@ -116,13 +105,13 @@ def consistency(result: Comparison, ax: Axes, words: Words = ENGLISH) -> Axes:
     ax.axhline(1, color="black", linewidth=0.8)
     ax.set_yscale("log")
     ax.grid(True, alpha=0.3)
-    _labelled(ax, words.normalised, words).set_ylim(0.5, 2)
+    _labelled(ax, words["axis_normalised"], words).set_ylim(0.5, 2)
     ax.set_yticks([0.5, 1, 2], ["0.5", "1", "2"])
     ax.set_yticks([], minor=True)
     return ax
 
 
-def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> Axes:
+def mode_probabilities(modes: Recognised, ax: Axes, words: Mapping[str, str] = ENGLISH) -> Axes:
     """Probabilities of all modes but the first against the step, on one trajectory, and the true
     mode."""
     steps, size = np.arange(len(modes.mode)), next(iter(modes.probability.values())).shape[1]
@@ -136,7 +125,7 @@ def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> A
     )
     for name, probability in modes.probability.items():
         for j in range(1, size):
-            label = words.title(name) + (f", $j={j + 1}$" if size > 2 else "")
+            label = title(name, words) + (f", $j={j + 1}$" if size > 2 else "")
             ax.plot(
                 steps,
                 probability[:, j],
@@ -145,7 +134,7 @@ def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> A
                 label=label,
             )
     ax.set_ylim(-0.02, 1.02)
-    return _labelled(ax, words.mode, words)
+    return _labelled(ax, words["axis_mode"], words)
 
 
 # Of a comparison, by name.

@@ -25,8 +25,8 @@ import joblib
 import numpy as np
 from tqdm import tqdm
 
-from kfcourse.errors import NoClosedForm, NotFinite
-from kfcourse.lab.admission import admissions
+from kfcourse.errors import NoClosedForm, NotFinite, Reason
+from kfcourse.lab.admission import admissions, aligned
 from kfcourse.lab.short_names import LAB, Structures, operations, title
 from kfcourse.lab.variants import RUNS, Variant
 from kfcourse.laws import Array, Gaussian
@@ -101,11 +101,11 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
     ----------
     variant : Variant
     runs : int
-        Trajectories, at least 256; a vector model gets an eighth of them.
+        Trajectories, at least 128; a vector model gets an eighth of them.
     seed : int
     ask : callable, optional
         Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None;
-        `kfcourse.checks.posing.unposed`.
+        `kfcourse.exercises.checks.posing.unposed`.
     """
     if runs < FEWEST:
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
@@ -154,8 +154,11 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
         return {"bounded": moments}
     try:
         result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
-    except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
-        return {"bounded": Finding(False, str(error), moments.value)}
+        failures: list[Reason] = [*result.left_out.values()]
+    except NotFinite as error:
+        failures = [error]
+    if failures:
+        return {"bounded": Finding(False, str(failures[0]), moments.value)}
     return {
         "bounded": not_diverging(result, x) or moments,
         "observable": observable(result, x),
@@ -171,7 +174,7 @@ def examine_all(
     ask: Ask | None = None,
 ) -> Iterator[Quality]:
     """`examine` every variant, in order, in so many processes, on which no number depends."""
-    parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
+    parallel = joblib.Parallel(n_jobs=jobs, return_as="generator")
     done = parallel(joblib.delayed(examine)(variant, runs, seed, ask) for variant in variants)
     yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
@@ -186,14 +189,12 @@ def table(qualities: Sequence[Quality]) -> str:
     """What `kfcourse variants --check` prints: a line for each variant, then what is not well
     posed."""
     rows = [("variant", *CRITERIA, "remarks"), *map(_row, qualities)]
-    form = "  ".join(f"{{:{max(map(len, column))}}}" for column in zip(*rows, strict=True))
     reasons = [
         f"variant {quality.name} is not well posed, {fault}: {why}"
         for quality in qualities
         for fault, why in quality.faults.items()
     ]
-    lines = [form.format(*row).rstrip() for row in rows]
-    return "\n".join([*lines, LEGEND, *([""] if reasons else []), *reasons])
+    return "\n".join([*aligned(rows), LEGEND, *([""] if reasons else []), *reasons])
 
 
 def _row(quality: Quality) -> tuple[str, ...]:

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,18 +27,18 @@ from kfcourse.files import replacing_together, save
 from kfcourse.filters import Design, Filter
 from kfcourse.lab import plots
 from kfcourse.lab.admission import Admission
+from kfcourse.lab.families import WORDS
 from kfcourse.lab.report_modes import JumpReport
-from kfcourse.lab.report_sections import LEVEL, ROUNDING, StudentReport
+from kfcourse.lab.report_sections import LEVEL, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
 from kfcourse.lab.short_names import title
 from kfcourse.lab.variants import Variant
-from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.comparison import ALIKE, Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 
-WORDS = tomllib.loads((resources.files("kfcourse.lab") / "report.toml").read_text(encoding="utf-8"))
 LANGUAGES = tuple(WORDS)
 RECOGNISED = 1600  # trajectories on which modes are told
 STANDARD_OUTPUT = ("-", "/dev/stdout")
@@ -70,14 +68,12 @@ def write_report(
         "variant": variant,
         "language": language,
     }
-    labels = plots.Words(
-        report.title, **{part: report.words[f"axis_{part}"] for part in plots.Words._fields[1:]}
-    )
+    drawn = {name: partial(plots.FIGURES[name], result) for name in report.figures}
+    if modes:
+        drawn["modes"] = partial(plots.mode_probabilities, modes)
     with replacing_together(folder) as place:
-        for name in report.figures:
-            save_figure(partial(plots.FIGURES[name], result, words=labels), place, name)
-        if modes:
-            save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "modes")
+        for name, draw in drawn.items():
+            save_figure(partial(draw, words=report.words), place, name)
         save_texts(("report.html", "report.tex"), place, content)
         return [folder / path.name for path in place.iterdir()]
 
@@ -182,11 +178,11 @@ def conclusions(result: Comparison) -> list[str]:
     for better, worse in pairwise(ranked):
         difference = result.mean_gap_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval())
-        if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model
+        if max(-low, high) < 100 * ALIKE:  # filters that coincide, as on a linear model
             sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
             continue
         verdict = (
-            "is more accurate than" if low > ROUNDING else "is not significantly different from"
+            "is more accurate than" if low > 100 * ALIKE else "is not significantly different from"
         )
         sentences.append(
             f"{title(better)} {verdict} {title(worse)}: "

@@ -31,9 +31,9 @@ from kfcourse.lab.report_text import (
     ranges,
     written_lines,
 )
-from kfcourse.lab.short_names import Structures, entry
+from kfcourse.lab.short_names import Structures, entry, title
 from kfcourse.laws import CONFIDENCE
-from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
+from kfcourse.montecarlo.comparison import ALIKE, Comparison, Verdict
 from kfcourse.montecarlo.modes import Recognised
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
@@ -41,10 +41,8 @@ from kfcourse.symbolic.reading import exact_matrix
 from kfcourse.symbolic.structure import FUNCTION_LATEX, Structure
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
-ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
-HIGHEST = 8  # moment that is printed
 
 # Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
 # gives.
@@ -314,7 +312,7 @@ class StudentReport:
             return []
         m, d = sp.symbols("m d", real=True)
         law = GaussianMoments([x], [m], sp.Matrix([[d]]))
-        highest = min(max(int(sp.degree(sp.expand(side), x)) for side in sides), HIGHEST)
+        highest = max(int(sp.degree(sp.expand(side), x)) for side in sides)
         return [
             f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}"
             for n in range(2, highest + 1)
@@ -462,7 +460,7 @@ class StudentReport:
         else:
             yield words["nobody_last"]
         # the control, or its equal
-        leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING
+        leads = not result.has_bound and abs(float(result.ranking()[0][1].value)) < ALIKE
         yield self.mean_sentence(
             "mean_first" if leads else "mean_bound" if result.has_bound else "mean_control"
         )
@@ -492,8 +490,7 @@ class StudentReport:
         )
 
     def title(self, name: str) -> str:
-        field_ = self.words["field_of_title"]
-        return self.words["exact_title"] if name == EXACT else str(getattr(entry(name), field_))
+        return title(name, self.words)
 
 
 def _value(mode: Model, name: sp.Symbol) -> str:

@@ -37,7 +37,7 @@ from kfcourse.filters.densities import has_object_noise
 from kfcourse.filters.exact.laws import modes_of
 from kfcourse.filters.optimal_structure import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
-from kfcourse.lab.families import FAMILIES
+from kfcourse.lab.families import FAMILIES, WORDS
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -189,7 +189,7 @@ def _averaged(family: str, build: Callable[[Structure], Filter | Design]) -> dic
     return {f"{family}-averaged": Entry(*names, lambda s: build(s.averaged), "averaged", family)}
 
 
-_EXACT = Entry("exact AOF", "АОФ", lambda s: exact(s.model), "exact", "aof")
+_EXACT = Entry("exact AOF", "точный АОФ", lambda s: exact(s.model), "exact", "aof")
 # One line a filter: this is where a new one is added.
 FILTERS: dict[str, Entry] = {
     **_twice("aof", aof),
@@ -264,9 +264,10 @@ def entry(name: str) -> Entry:
     return Entry(printed, printed, build, functions.removeprefix("jump-"), family)
 
 
-def title(name: str) -> str:
-    """The printed name of a filter: "GAOF" for "aof-gaussian", "GFKP2" for "fkp2-gaussian"."""
-    return entry(name).title
+def title(name: str, words: Mapping[str, str] = WORDS["en"]) -> str:
+    """The printed name of a filter in the language of these words: "GAOF" for "aof-gaussian",
+    "GFKP2" for "fkp2-gaussian"."""
+    return str(getattr(entry(name), words["field_of_title"]))
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:

@@ -155,5 +155,4 @@ def _affine(
             f"aof(linearised(model))"
         )
     constant = numeric.subs(dict.fromkeys(variables, 0))
-    outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": constant}
-    return Stepwise.compile(model.known, "matrices", {}, outputs, ["constant"])
+    return model.compiled([], [slopes[:, : len(x)], slopes[:, len(x) :], list(constant)])

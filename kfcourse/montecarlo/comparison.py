@@ -29,7 +29,8 @@ HEAVY = 0.1  # part of D_k that a single trajectory makes where the filter diver
 # of the bound: standard error at least of what is said of a single step, as rare trajectories carry
 # what is smaller
 RESOLUTION = 5e-4
-ALIKE = 1e-10  # of D_k: filters that differ by less coincide but for rounding
+# of D_k: filters that differ by less coincide, as half of their digits may be lost on the way
+ALIKE = 1e-8
 
 
 class Verdict(NamedTuple):
@@ -254,13 +255,13 @@ class Comparison:
         )
         return [[self.entrants[i] for i in column] for column in order.T]
 
-    def leaders(self, step: int, confidence: float = CONFIDENCE) -> list[str]:
+    def leaders(self, step: int) -> list[str]:
         """The most accurate entrant at a step, then those that are not significantly worse, each by
         its own paired interval."""
         best, *others = self._ranked[step]
         return [
             best,
-            *(name for name in others if self._p_value(name, best)[step] > 1 - confidence),
+            *(name for name in others if self._p_value(name, best)[step] > 1 - CONFIDENCE),
         ]
 
     def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:
@@ -334,9 +335,10 @@ class Comparison:
         """M[Integral (P(y) - [y >= y_k])^2 dy] per step, (steps,), P the predicted distribution:
         the less the better; in the units of y, the sum over its components.
 
-        M|e| of a filter that claims to be sure.  NaN for filters whose predictions are neither
-        normal laws nor mixtures of some (T. Gneiting and A. Raftery, Strictly proper scoring
-        rules, J. Am. Stat. Assoc. 102, 2007).
+        M|e| of a filter that claims to be sure.  The exact filter's and the particles' are had by
+        draws from their predictions.  NaN for gated filters and others whose predictions are
+        neither normal laws nor mixtures of some (T. Gneiting and A. Raftery, Strictly proper
+        scoring rules, J. Am. Stat. Assoc. 102, 2007).
         """
         return self._score("crps", name, minus, steps)
 
@@ -351,7 +353,10 @@ class Comparison:
 
     def _means(self, kind: str, name: str) -> Array:
         if name not in self.names:
-            raise KeyError(f"no results for {name!r}; this comparison has {', '.join(self.names)}")
+            why = f": {self.left_out[name]}" if name in self.left_out else ""
+            raise KeyError(
+                f"no results for {name!r}{why}; this comparison has {', '.join(self.names)}"
+            )
         return self.sums.means(kind)[self.names.index(name)]
 
     def _largest(self, name: str) -> Array:

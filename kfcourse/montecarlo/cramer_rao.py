@@ -30,7 +30,6 @@ from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.statistics import Estimate, means_without_each
 from kfcourse.symbolic.choices import jumps
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
@@ -129,11 +128,8 @@ def _information(
         raise ValueError(
             _infinite(what, f"its noise vanishes at {model.x[0]} = {', '.join(map(str, zeros))}")
         )
-    outputs = {"slope": equation.subs(at_mean).jacobian(sp.Matrix(model.x)), "S": S}
-    outputs |= {f"S{i}": S.diff(x) for i, x in enumerate(model.x)}
-    functions = Stepwise.compile(
-        model.known, f"{what}_information", {"x": sp.Matrix(model.x)}, outputs, ["x"]
-    )
+    slope = equation.subs(at_mean).jacobian(sp.Matrix(model.x))
+    functions = model.compiled([model.x], [slope, S, *(S.diff(x) for x in model.x)])
 
     def at(x: Array, k: int) -> tuple[Array, Array, Array]:
         slope, S, *changes = (

@@ -8,11 +8,11 @@ share the designs.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
+import joblib
 import numpy as np
 
-from kfcourse.errors import NotFinite, expect
+from kfcourse.errors import NotFinite, Refused, expect
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design
 from kfcourse.laws import NegativeVariance
@@ -20,17 +20,22 @@ from kfcourse.montecarlo.ensemble import Instant
 
 
 def failed(name: str, step: int, error: Exception) -> NotFinite:
-    """What a filter's linear algebra raised at a step, as the reason for which it is left out."""
+    """What a filter raised at a step, as the reason for which it is left out."""
     kind = "negative" if isinstance(error, NegativeVariance) else ""
-    return NotFinite(f"step {step}: {name} failed: {error}", name, kind, step=step)
+    names_itself = isinstance(error, Refused)
+    words = str(error) if names_itself else f"step {step}: {name} failed: {error}"
+    return NotFinite(words, name, kind, step=step)
 
 
-def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1) -> list[Filter]:
+def design(
+    filters: Sequence[Filter | Design], ensemble: Iterable[Instant], jobs: int = 1
+) -> list[Filter]:
     """Fit every design on the same trajectories.
 
     Parameters
     ----------
-    designs : sequence of Design
+    filters : sequence of Design
+        A `Filter` among them stays as it is.
     ensemble : iterable of Instant
         For each step x_k, y_k and x_{k+1}: an `Ensemble`, or stored trajectories.
     jobs : int
@@ -39,7 +44,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
     Returns
     -------
     list of Filter
-        In the order of `designs`, for as many steps as the ensemble has.
+        In the order of `filters`; the designed ones for as many steps as the ensemble has.
 
     Raises
     ------
@@ -49,25 +54,27 @@ def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1
         If a regression meets infinite or NaN values, or a filter a negative variance: the model or
         the filter diverges.
     """
-    for design_ in designs:
-        expect(design_, Design, "design")
+    for filter_ in filters:
+        expect(filter_, Design, "design", Filter)
+    designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     states = list[State]()
-    with ThreadPoolExecutor(jobs) as pool:
-        for k, instant in enumerate(ensemble):
+    with joblib.Parallel(jobs, prefer="threads") as parallel:
+        for k, instant in enumerate(ensemble if designs else ()):
             if k == 0:
                 check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
                 states = [design_.init(len(instant.x)) for design_ in designs]
-            given = [
-                (design_, state, instant, k) for design_, state in zip(designs, states, strict=True)
-            ]
-            results = list(pool.map(lambda task: _fitted(*task), given))
+            results = parallel(
+                joblib.delayed(_fitted)(design_, state, instant, k)
+                for design_, state in zip(designs, states, strict=True)
+            )
             states = [state for state, _ in results]
             for table, (_, fits) in zip(coefficients, results, strict=True):
                 table.append(fits)
+    tables = iter(coefficients)
     return [
-        design_.with_coefficients(table)
-        for design_, table in zip(designs, coefficients, strict=True)
+        filter_.with_coefficients(next(tables)) if isinstance(filter_, Design) else filter_
+        for filter_ in filters
     ]
 
 

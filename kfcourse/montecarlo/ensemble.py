@@ -62,12 +62,15 @@ class Ensemble:
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
         A number becomes one.
+    wide : float, optional
+        Initial states are drawn as by `stratified`, to be weighted by `weights`.
     """
 
     model: Model | JumpModel
     runs: int
     steps: int
     seed: np.random.SeedSequence
+    wide: float | None = None
 
     def __post_init__(self) -> None:
         expect(self.model, Model, "an ensemble", JumpModel)
@@ -76,28 +79,17 @@ class Ensemble:
         expect_sizes(runs=self.runs, steps=self.steps)
 
     def __iter__(self) -> Iterator[Instant]:
-        return instants(self.model, [self.runs], self.steps, [self.seed])
+        return side_by_side([self])
 
 
-def instants(
-    model: Model | JumpModel,
-    sizes: Sequence[int],
-    steps: int,
-    seeds: Sequence[np.random.SeedSequence],
-    wide: float | None = None,
-) -> Iterator[Instant]:
-    """The steps of several ensembles side by side, each of its size and drawn from its seed.
-
-    With `wide` their initial states are drawn as by `stratified`, to be weighted by `weights`.
-    """
+def side_by_side(ensembles: Sequence[Ensemble]) -> Iterator[Instant]:
+    """The steps of ensembles of one model, as of a single one that holds all their trajectories."""
+    model, steps = ensembles[0].model, ensembles[0].steps
     advance = _jumping(model) if isinstance(model, JumpModel) else _moving(model)
-    start = _joined([_initial(model, *part, wide) for part in zip(sizes, seeds, strict=True)])
+    start = _joined([_initial(ensemble) for ensemble in ensembles])
     for first in range(0, steps, STEPS_AT_ONCE):
-        count, key = min(STEPS_AT_ONCE, steps - first), 1 + first // STEPS_AT_ONCE
-        parts = [
-            _noises(model, _stream(seed, 0, key), count, size)
-            for size, seed in zip(sizes, seeds, strict=True)
-        ]
+        count = min(STEPS_AT_ONCE, steps - first)
+        parts = [_noises(ensemble, 1 + first // STEPS_AT_ONCE, count) for ensemble in ensembles]
         for k in range(count):
             noises = _joined([[kind[k] for kind in part] for part in parts])
             instant = advance(first + k, *start, *noises)
@@ -126,6 +118,20 @@ def simulate(
     if isinstance(model, JumpModel):
         return JumpTrajectories(np.stack(x), np.stack(y), np.stack(mode))
     return Trajectories(np.stack(x), np.stack(y))
+
+
+def foretold(ensemble: Ensemble, k: int, drawn: tuple[Array, Array] | None) -> Array:
+    """y_k (runs, p) of an ensemble whose states x_{k-1} (runs, n) and modes (runs,), if it has any,
+    are these; of the first step by the prior."""
+    model = ensemble.model
+    advance = _jumping(model) if isinstance(model, JumpModel) else _moving(model)
+    before, now = zip(*_noises(ensemble, 1, 2), strict=True)
+    state: Sequence[Array | None] = _initial(ensemble)
+    if drawn is not None:
+        size = len(state)  # two with modes
+        moved = advance(k - 1, *drawn[:size], *before)
+        state = (moved.x_next, moved.mode_next)[:size]
+    return advance(k, *state, *now).y
 
 
 def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:
@@ -161,12 +167,13 @@ Advance = Callable[..., Instant]
 
 
 def _moving(model: Model) -> Advance:
-    """One step of the model: (k, x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
+    """One step of the model: (k, x, standard v, w) -> x, y = b(x, w), x' = a(x, v)."""
     state, meter = compile_model(model)
 
     def advance(k: int, x: Array, v: Array, w: Array) -> Instant:
         with np.errstate(over="ignore", invalid="ignore"):  # who looks at it reports what diverges
-            y, x_next = meter(x, w, k), state(x, v, k)
+            y = meter(x, _of_law(w, model.meter_noise), k)
+            x_next = state(x, _of_law(v, model.state_noise), k)
         # a formula without noise and state is one constant for all trajectories
         y = np.broadcast_to(y, (len(x), model.p))
         x_next = np.broadcast_to(x_next, (len(x), model.n))
@@ -215,29 +222,28 @@ def _stream(seed: np.random.SeedSequence, *key: int) -> np.random.Generator:
     return np.random.Generator(np.random.SFC64(spawned))
 
 
-def _initial(
-    model: Model | JumpModel, size: int, seed: np.random.SeedSequence, wide: float | None
-) -> list[Array]:
-    """Initial states (size, n), and modes if there are any; these from a stream of their own."""
-    rng, prior = _stream(seed, 0, 0), model.prior
-    r = len(prior.mean)
-    standard = rng.standard_normal((r, size)).T if wide is None else stratified(rng, size, r, wide)
-    x = on_circle(_of_law(standard, prior), model.angles.x)
+def _initial(ensemble: Ensemble) -> list[Array]:
+    """Initial states (runs, n), and modes if there are any; these from a stream of their own."""
+    model, runs, wide = ensemble.model, ensemble.runs, ensemble.wide
+    rng, r = _stream(ensemble.seed, 0, 0), len(model.prior.mean)
+    standard = rng.standard_normal((r, runs)).T if wide is None else stratified(rng, runs, r, wide)
+    x = on_circle(_of_law(standard, model.prior), model.angles.x)
     if not isinstance(model, JumpModel):
         return [x]
-    return [x, _chosen(model.first[None], _stream(seed, 0, 0, 0).random(size))]
+    return [x, _chosen(model.first[None], _stream(ensemble.seed, 0, 0, 0).random(runs))]
 
 
-def _noises(
-    model: Model | JumpModel, rng: np.random.Generator, steps: int, size: int
-) -> list[Array]:
-    """Noises v and w of a few steps, (steps, size, r); of a model that jumps standard, and (steps,
-    size) in 0 to 1."""
-    if isinstance(model, JumpModel):
-        noises = (model.modes[0].v, model.modes[0].w)
-        drawn = [rng.standard_normal((steps, len(noise), size)).swapaxes(1, 2) for noise in noises]
-        return [*drawn, rng.random((steps, size))]
-    return [_normal(rng, law, steps, size) for law in (model.state_noise, model.meter_noise)]
+def _noises(ensemble: Ensemble, key: int, steps: int) -> list[Array]:
+    """Standard normal numbers for v and w of a few steps, (steps, runs, r); of a model that jumps
+    also (steps, runs) in 0 to 1."""
+    model, runs, rng = ensemble.model, ensemble.runs, _stream(ensemble.seed, 0, key)
+    mode = model.modes[0] if isinstance(model, JumpModel) else model
+    # every component contiguous in memory
+    drawn = [
+        rng.standard_normal((steps, len(law.mean), runs)).swapaxes(1, 2)
+        for law in (mode.state_noise, mode.meter_noise)
+    ]
+    return [*drawn, rng.random((steps, runs))] if isinstance(model, JumpModel) else drawn
 
 
 def _chosen(probabilities: Array, u: Array) -> Array:
@@ -247,13 +253,6 @@ def _chosen(probabilities: Array, u: Array) -> Array:
 
 
 def _of_law(standard: Array, law: Gaussian) -> Array:
-    return law.mean + standard @ square_root(law.cov).T
-
-
-def _normal(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
-    """Gaussian noise (steps, size, r), every component contiguous in memory."""
-    r = len(law.mean)
-    standard = rng.standard_normal((steps, r, size)).swapaxes(1, 2)
-    if not law.mean.any() and np.array_equal(law.cov, np.eye(r)):
+    if not law.mean.any() and np.array_equal(law.cov, np.eye(len(law.mean))):
         return standard
-    return _of_law(standard, law)
+    return law.mean + standard @ square_root(law.cov).T

@@ -10,11 +10,11 @@ trajectories, and keeps sums over batches of these, never the trajectories thems
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import accumulate, islice
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import joblib
 import numpy as np
@@ -29,10 +29,10 @@ from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import check_sizes, design, failed
-from kfcourse.montecarlo.ensemble import Instant, instants, weights
+from kfcourse.montecarlo.ensemble import Ensemble, Instant, side_by_side, weights
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.scores import scored
-from kfcourse.montecarlo.statistics import Sums
+from kfcourse.montecarlo.statistics import Sums, claimed
 from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -46,6 +46,7 @@ DESIGN_RUNS = 200_000
 WIDE = 1.5  # times as wide as the prior: a law from which half of the initial states are drawn
 
 T = TypeVar("T")
+F = TypeVar("F", Filter, Filter | Design)
 
 
 def run(filter_: Filter, y: Array) -> Gaussian:
@@ -144,8 +145,8 @@ def compare(
     ----------
     filters : sequence of Filter or Design
         Designs are designed first, on an ensemble of their own; standard errors hold for the
-        filters as they were designed. One that cannot go on (the exact one, particles) is left out,
-        and `Comparison.left_out` tells why.
+        filters as they were designed. One that cannot go on, as it leaves the finite numbers or
+        says so itself, is left out, and `Comparison.left_out` tells why.
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
@@ -178,7 +179,7 @@ def compare(
     ValueError
         Filters of equal name, sizes that are not positive whole numbers.
     NotFinite
-        A trajectory or a filter left the finite numbers.
+        The model's trajectories become infinite, or no filter is left.
     """
     _check_arguments(filters, model)
     if smoothers:
@@ -192,28 +193,29 @@ def compare(
     if not isinstance(seed, int | np.integer) or seed < 0:
         raise ValueError(f"the seed must be a whole number, not negative, got {seed!r}")
     design_seed, *seeds = np.random.SeedSequence(seed).spawn(1 + min(BATCHES, runs))
-    sizes = batch_sizes(runs)
-    where = (sizes, seeds) if same_ensemble else ([design_runs], [design_seed])
-    ready = _designed(filters, instants(model, where[0], steps, where[1]), steps, jobs, progress)
-    sample = Sample(model, steps, sizes, seeds, None if same_ensemble else width(model))
+    wide = None if same_ensemble else width(model)
+    batches = [
+        Ensemble(model, size, steps, each, wide)
+        for size, each in zip(batch_sizes(runs), seeds, strict=True)
+    ]
+    ensemble = batches if same_ensemble else [Ensemble(model, design_runs, steps, design_seed)]
+    work: dict[str, Any] = {"jobs": jobs, "progress": progress}
+    left_out = dict[str, Reason]()
+
+    def designed(those: Sequence[Filter | Design]) -> list[Filter]:
+        shown = _progress("designing", steps, "step", progress, side_by_side(ensemble))
+        return design(those, shown, jobs)
+
+    ready = _able(filters, left_out, designed)
     with cluster(dask):
-        try:
-            result = _compared(ready, sample, seed, jobs, progress, scores=scores)
-        except NotFinite:
-            if sample.wide is None:
-                raise
-            # some far start is too far: none but the prior's own
-            sample = sample._replace(wide=None)
-            result = _compared(ready, sample, seed, jobs, progress, scores=scores)
-        if not same_ensemble:
-            result = replace(
-                result,
-                designed=tuple(filter_.name for filter_ in filters if isinstance(filter_, Design)),
-            )
+        result = _compared(ready, batches, seed, left_out, scores=scores, **work)
         if smoothers:
-            looking_back = _compared(smoothers, sample, seed, jobs, progress, back=True)
+            looking_back = _compared(smoothers, batches, seed, {}, back=True, **work)
             result = replace(result, smoothing=looking_back)
-    return result
+    if same_ensemble:
+        return result
+    designs = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
+    return replace(result, designed=tuple(designs))
 
 
 def width(model: Model | JumpModel) -> float | None:
@@ -227,177 +229,130 @@ def batch_sizes(runs: int) -> list[int]:
     return np.diff(np.linspace(0, runs, min(BATCHES, runs) + 1).astype(int)).tolist()
 
 
-def without_failing(
-    filters: Sequence[Filter | Design],
-    *common: Any,
-    left_out: Mapping[str, Reason] | None = None,
-    **options: Any,
-) -> Comparison:
-    """`compare` of the filters that do not fail; the others are named in `left_out`, beside those
-    given.
-
-    A filter that leaves the finite numbers is taken out, and the comparison starts again.  Other
-    arguments as of `compare`.
-
-    Raises
-    ------
-    NotFinite
-        The model's trajectories become infinite, or no filter is left.
-    """
-    reasons = dict(left_out or {})
+def _able(filters: Sequence[F], left_out: dict[str, Reason], work: Callable[[Sequence[F]], T]) -> T:
+    """What the work makes of the filters that can do it; it begins again without one that cannot,
+    and `left_out` gets the reason."""
     while True:
         try:
-            result = compare(filters, *common, **options)
+            return work(filters)
         except NotFinite as error:
             rest = [filter_ for filter_ in filters if filter_.name != error.filter_name]
-            if not error.filter_name or not [filter_ for filter_ in rest if not filter_.slow]:
+            if not rest or len(rest) == len(filters):
                 raise
-            filters, reasons[error.filter_name] = rest, error.with_traceback(None)
-        else:
-            return replace(result, left_out={**reasons, **result.left_out})
-
-
-class Sample(NamedTuple):
-    """The trajectories of a comparison: batches of such sizes, each drawn from its seed."""
-
-    model: Model | JumpModel
-    steps: int
-    sizes: list[int]
-    seeds: list[np.random.SeedSequence]
-    wide: float | None = None
-
-    def part(self, batches: slice) -> Sample:
-        """Some of the batches."""
-        return self._replace(sizes=self.sizes[batches], seeds=self.seeds[batches])
-
-    def begun(self, filter_: Filter) -> State:
-        """A filter's state before the first measurement; what draws random numbers draws others for
-        each sample."""
-        state = filter_.init(sum(self.sizes))
-        if not hasattr(state.memory, "part"):
-            return state
-        return state._replace(memory=replace(state.memory, part=self.seeds[0].spawn_key))
-
-    def instants(self) -> Iterator[Instant]:
-        """The steps of all batches side by side."""
-        return instants(self.model, self.sizes, self.steps, self.seeds, self.wide)
-
-
-def _designed(
-    filters: Sequence[Filter | Design],
-    ensemble: Iterable[Instant],
-    steps: int,
-    jobs: int,
-    progress: bool | None,
-) -> list[Filter]:
-    """The filters in their order, those that need it designed on the ensemble."""
-    designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
-    if not designs:
-        return [filter_ for filter_ in filters if isinstance(filter_, Filter)]
-    ready = iter(design(designs, _progress("designing", steps, "step", progress, ensemble), jobs))
-    return [next(ready) if isinstance(filter_, Design) else filter_ for filter_ in filters]
+            filters, left_out[error.filter_name] = rest, error.with_traceback(None)
 
 
 def _compared(
     filters: Sequence[Filter],
-    sample: Sample,
+    batches: Sequence[Ensemble],
     seed: int,
+    left_out: dict[str, Reason],
+    **options: Any,
+) -> Comparison:
+    """All filters on the batches that can go on; the others are left out.  Options of `_summed`."""
+
+    first = batches[0]
+
+    def summed(those: Sequence[Filter]) -> tuple[Sequence[Filter], Sums]:
+        try:
+            return those, _summed(those, batches, **options)
+        except NotFinite:
+            if first.wide is None:
+                raise
+            # some far start is too far: none but the prior's own
+            return those, _summed(those, [replace(b, wide=None) for b in batches], **options)
+
+    able, sums = _able(filters, left_out, summed)
+    names, runs = tuple(filter_.name for filter_ in able), sum(batch.runs for batch in batches)
+    comparison = Comparison(first.model, names, runs, first.steps, seed, sums)
+    return replace(comparison, left_out=left_out, scored=options.get("scores") is not None)
+
+
+def _summed(
+    filters: Sequence[Filter],
+    batches: Sequence[Ensemble],
+    *,
     jobs: int,
     progress: bool | None,
-    *,
     back: bool = False,
     scores: Structure | None = None,
-) -> Comparison:
-    """All filters on the sample; one that cannot go on is left out, and the others start again."""
-    running, left_out = list(filters), dict[str, Reason]()
-    while True:
-        # slow filters take much memory for each trajectory, and so does looking back
-        dear = back or any(filter_.slow for filter_ in running)
-        each = 1 if dear else max(1, PIECE // max(sample.sizes))
-        parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
-        work = (
-            joblib.delayed(run_batches)(running, part, back=back, scores=scores) for part in parts
-        )
-        done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
-        try:
-            sums = Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
-        except LeftOut as failure:
-            left_out[failure.filter_name] = failure.reason
-            running = [filter_ for filter_ in running if filter_.name != failure.filter_name]
-            if not running:
-                raise NotFinite(str(failure.reason), failure.filter_name) from None
-        else:
-            names = tuple(filter_.name for filter_ in running)
-            runs = sum(sample.sizes)
-            return Comparison(
-                sample.model,
-                names,
-                runs,
-                sample.steps,
-                seed,
-                sums,
-                left_out=left_out,
-                scored=scores is not None,
-            )
-
-
-class LeftOut(Exception):
-    """A filter that cannot go on, as it is slow or says so itself, and that the others do
-    without."""
-
-    def __init__(self, filter_name: str, reason: Reason):
-        super().__init__(filter_name, reason)
-        self.filter_name, self.reason = filter_name, reason
+) -> Sums:
+    """The sums over all batches, of which pieces are shared out."""
+    # slow filters take much memory for each trajectory, and so does looking back
+    dear = back or any(filter_.slow for filter_ in filters)
+    each = 1 if dear else max(1, PIECE // batches[0].runs)
+    parts = [batches[b : b + each] for b in range(0, len(batches), each)]
+    work = (joblib.delayed(run_batches)(filters, part, back=back, scores=scores) for part in parts)
+    done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
+    return Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
 
 
 def run_batches(
     filters: Sequence[Filter],
-    sample: Sample,
+    batches: Sequence[Ensemble],
     *,
     back: bool = False,
     scores: Structure | None = None,
 ) -> Sums:
-    """Advance all filters together over the steps of a sample; `back`: let them look back from its
-    end; `scores`: judge what they expect of measurements."""
-    starts = np.concatenate([[0], np.cumsum(sample.sizes[:-1])]).astype(int)
-    sums = Sums.empty(len(filters), sample.steps, sample.model.n, len(sample.sizes))
+    """Advance all filters together over the steps of some batches; `back`: let them look back from
+    the end; `scores`: judge what they expect of measurements."""
+    model, steps, wide = batches[0].model, batches[0].steps, batches[0].wide
+    starts = np.cumsum([0, *(batch.runs for batch in batches[:-1])])
+    sums = Sums.empty(len(filters), steps, model.n, len(batches))
     exact = next((i for i, filter_ in enumerate(filters) if filter_.name == EXACT), None)
-    angles = sample.model.angles.x
+    angles = model.angles.x
+
+    def total(values: Array) -> Array:
+        """The weighted sums over each batch, of (..., runs)."""
+        return np.add.reduceat(weight * values, starts, axis=-1)
+
     # what diverges is reported below, by name
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        for k, (instant, before, laws) in enumerate((_back if back else _onward)(filters, sample)):
+        for k, (instant, before, laws) in enumerate((_back if back else _onward)(filters, batches)):
             if k == 0:
-                weight = weights(sample.model.prior, instant.x, sample.wide)
+                weight = weights(model.prior, instant.x, wide)
                 sums.weight[:] = np.add.reduceat(weight, starts)
-            sums.size[k] = np.add.reduceat(weight * (instant.x**2).sum(axis=1), starts)
+            sums.size[k] = total((instant.x**2).sum(axis=1))
             for i, state in enumerate(laws):
                 with _named(filters[i], k):
-                    x = near(instant.x, state.posterior.mean, angles)
-                    sums.record(i, k, x, state.posterior, weight, starts)
+                    error = near(instant.x, state.posterior.mean, angles) - state.posterior.mean
+                    square = error**2
+                    sums.error[i, k], sums.square[i, k] = total(error.T), total(square.T)
+                    largest = weight * square.sum(axis=1)
+                    sums.largest[i, k] = np.maximum.reduceat(largest, starts)
+                    own, normalised = claimed(error, state.posterior.cov)
+                    sums.own[i, k], sums.normalised[i, k] = total(own), total(normalised)
                     if scores is not None:
-                        both = scored(filters[i], scores, before[i], instant.y, state)
-                        sums.log_score[i, k], sums.crps[i, k] = (
-                            np.add.reduceat(weight * values, starts) for values in both
-                        )
+                        both = scored(filters[i], scores, before[i], instant.y, state, batches[0])
+                        sums.log_score[i, k], sums.crps[i, k] = map(total, both)
             if exact is None:
                 continue
             first, second, error = _twice(laws[exact])
-            sums.doubt[k] = np.add.reduceat(weight * error**2, starts)
+            sums.doubt[k] = total(error**2)
             for i in {*range(len(laws))} - {exact}:
                 mean = laws[i].posterior.mean
                 product = difference(mean, first, angles) * difference(mean, second, angles)
-                sums.distance[i, k] = np.add.reduceat(weight * product.sum(axis=1), starts)
+                sums.distance[i, k] = total(product.sum(axis=1))
     _check_finite(filters, sums)
     return sums
+
+
+def _begun(filter_: Filter, batches: Sequence[Ensemble]) -> State:
+    """A filter's state before the first measurement; what draws random numbers draws others for
+    each piece of work."""
+    state = filter_.init(sum(batch.runs for batch in batches))
+    if not hasattr(state.memory, "part"):
+        return state
+    return state._replace(memory=replace(state.memory, part=batches[0].seed.spawn_key))
 
 
 Stage = tuple[Instant, list[State], list[State]]
 
 
-def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
+def _onward(filters: Sequence[Filter], batches: Sequence[Ensemble]) -> Iterator[Stage]:
     """The states of all filters before and after each measurement."""
-    states = [sample.begun(filter_) for filter_ in filters]
-    for k, instant in enumerate(sample.instants()):
+    states = [_begun(filter_, batches) for filter_ in filters]
+    for k, instant in enumerate(side_by_side(batches)):
         before = [*states]
         for i, filter_ in enumerate(filters):
             with _named(filter_, k):
@@ -405,14 +360,14 @@ def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
         yield instant, before, states
 
 
-def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[Stage]:
+def _back(filters: Sequence[Filter], batches: Sequence[Ensemble]) -> Iterator[Stage]:
     """What all filters tell of each step once they have seen the last."""
-    record = list(sample.instants())
+    record = list(side_by_side(batches))
     y = np.stack([instant.y for instant in record])
     laws = []
     for filter_ in filters:
         with _named(filter_, len(record) - 1):
-            states = accumulate(y, filter_.step, initial=sample.begun(filter_))
+            states = accumulate(y, filter_.step, initial=_begun(filter_, batches))
             laws.append(looked_back(filter_, islice(states, 1, None), y))
     for instant, after in zip(record, map(list, zip(*laws, strict=True)), strict=True):
         yield instant, [], after
@@ -435,9 +390,8 @@ def _named(filter_: Filter, step: int) -> Iterator[None]:
     try:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
-        if filter_.slow or isinstance(error, Refused):
-            raise LeftOut(filter_.name, error.with_traceback(None)) from None
-        if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
+        numbers = Refused | NotFinite | NegativeVariance | np.linalg.LinAlgError
+        if filter_.slow or isinstance(error, numbers):
             raise failed(filter_.name, step, error) from None
         raise
 
@@ -453,14 +407,13 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
             f"its equations and parameters"
         )
     filter_ = filters[int(np.argmin(finite[:, step]))]
-    reason = NotFinite(
+    raise NotFinite(
         f"step {step}: {filter_.name} became infinite or NaN although the trajectories are finite: "
         f"the filter diverges, or its model is another",
         filter_.name,
         "infinite",
         step=step,
     )
-    raise LeftOut(filter_.name, reason) if filter_.slow else reason
 
 
 def _progress(

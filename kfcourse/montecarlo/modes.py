@@ -4,6 +4,7 @@ mode is the true one."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from kfcourse.filters.base import Filter
 from kfcourse.filters.designed import Design
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.montecarlo.experiment import walk
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 
@@ -57,16 +59,11 @@ def recognised(
         if not (isinstance(filter_, Filter) and hasattr(filter_.init(1).memory, "probability")):
             continue
         size = least if filter_.slow else runs
-        state, right = filter_.init(size), np.zeros(size)
-        probabilities = []
-        for k in range(steps):
-            state = filter_.step(state, y[k, :size])
-            chances = state.memory.probability
-            right += chances.argmax(axis=1) == mode[k, :size]
-            probabilities.append(chances[shown])
-        each = right / steps
-        share[filter_.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
-        there[filter_.name] = np.array(probabilities)
+        after = islice(walk(filter_, y[:, :size]), 1, None)
+        chances = np.stack([state.memory.probability for state in after])  # (steps, size, J)
+        right = (chances.argmax(axis=2) == mode[:, :size]).mean(axis=0)
+        share[filter_.name] = Estimate(right.mean(), right.std(ddof=1) / np.sqrt(size), size - 1)
+        there[filter_.name] = chances[:, shown]
     likeliest = [
         (np.bincount(mode[k]) if model.by_state else model.law_at(k)).argmax() for k in range(steps)
     ]

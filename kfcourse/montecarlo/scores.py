@@ -8,38 +8,75 @@ of a mixture of N(h_i, s_i^2) with the weights w_i is
 
     sum w_i a(y - h_i, s_i) - sum w_i w_j a(h_i - h_j, sqrt(s_i^2 + s_j^2)) / 2,
 
-and of a single normal law a(y - h, s) - s / sqrt(pi): T. Gneiting and A. Raftery (2007); E. Grimit
+and of a single normal law a(y - h, s) - s / sqrt(pi).  Of any other law it is
+M|y - Y| - M|Y - Y'| / 2 with Y and Y' drawn from it: T. Gneiting and A. Raftery (2007); E. Grimit
 and others, Q. J. R. Meteorol. Soc. 132 (2006).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import ndtr
 
-from kfcourse.filters.base import Filter, State
+from kfcourse.angles import Components, difference
+from kfcourse.filters.base import Draw, Filter, State
 from kfcourse.laws import Array, log_density
+from kfcourse.montecarlo.ensemble import Ensemble, foretold
 from kfcourse.symbolic.structure import Structure
+
+DRAWS = 16  # of what is neither a normal law nor a mixture: they widen the interval by a tenth
 
 
 def scored(
-    chosen: Filter, structure: Structure, before: State, y: Array, after: State
+    chosen: Filter,
+    structure: Structure,
+    before: State,
+    y: Array,
+    after: State,
+    batch: Ensemble,
 ) -> tuple[Array, Array]:
     """Both scores of the measurement y (runs, p) for each trajectory, (runs,), by the filter's own
-    structural functions, or these; NaN for the second where the prediction is neither a normal law
-    nor a mixture of some."""
+    structural functions, or these; NaN for the second where the prediction cannot be had.  The
+    batch, the first of several, gives what is drawn a seed."""
+    unknown = np.full(len(y), np.nan)
+    log = chosen.evidence(before, y, after) if chosen.evidence else unknown
+    if chosen.drawn is not None:
+        expected = _expected(chosen.drawn, before, batch)
+        return log, crps_of_draws(y, expected, batch.model.angles.y)
     if chosen.mixture is not None:
         weights, laws = chosen.mixture(before)
     elif chosen.evidence is not None:
-        return chosen.evidence(before, y, after), np.full(len(y), np.nan)
+        return log, unknown
     else:
         expects = (chosen.structure or structure).at(before.step).measure
         weights, laws = np.ones((1, 1)), [after.expected or expects(*before.predicted)]
-    log = chosen.evidence(before, y, after) if chosen.evidence else log_density(laws[0], y)
+        log = log_density(laws[0], y)
     errors = np.stack([law.innovation(y) for law in laws], axis=-1)
     variances = [np.diagonal(law.F, axis1=-2, axis2=-1) for law in laws]
     deviations = np.sqrt(np.stack(np.broadcast_arrays(y, *variances)[1:], axis=-1))
     return log, crps(errors, deviations, weights[:, None]).sum(axis=-1)
+
+
+def _expected(draw: Draw, before: State, batch: Ensemble) -> Array:
+    """Measurements drawn from what a filter expects, (DRAWS, runs, p)."""
+    runs, key = len(before.posterior.mean), (*batch.seed.spawn_key, 1, before.step)
+    seed = np.random.SeedSequence(batch.seed.entropy, spawn_key=key)
+    drawn = None
+    if before.step > 0:
+        x, mode = draw(before, DRAWS, np.random.default_rng(seed))
+        drawn = x.reshape(-1, x.shape[-1]), mode.ravel()
+    y = foretold(replace(batch, runs=DRAWS * runs, seed=seed, wide=None), before.step, drawn)
+    return y.reshape(DRAWS, runs, -1)
+
+
+def crps_of_draws(y: Array, drawn: Array, angles: Components) -> Array:
+    """Of a law of which some measurements were drawn, (draws, runs, p): M|y - Y| - M|Y - Y'| / 2
+    without bias, Y' the next draw; summed over the components, (runs,)."""
+    missed = np.abs(difference(y, drawn, angles))
+    apart = np.abs(difference(np.roll(drawn, 1, axis=0), drawn, angles))
+    return (missed - apart / 2).mean(axis=0).sum(axis=-1)
 
 
 def crps(errors: Array, deviations: Array, weights: Array) -> Array:

@@ -9,14 +9,14 @@ So differences, ratios and means over steps need no formula of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square
+from kfcourse.laws import CONFIDENCE, Array, normalised_square
 from kfcourse.montecarlo import BATCHES
 
 
@@ -76,11 +76,8 @@ class Estimate:
             self.standard_error == 0, certain, 2 * scipy.special.stdtr(self.freedom, -np.abs(t))
         )
 
-    def __iter__(self) -> Iterator[Estimate]:
-        """Along the first axis: the steps, one after the other."""
-        return (self[k] for k in range(len(self.value)))
-
     def __getitem__(self, index) -> Estimate:
+        """That of some places; an iteration goes over the steps."""
         return Estimate(self.value[index], self.standard_error[index], self.freedom)
 
 
@@ -157,29 +154,20 @@ class Sums(NamedTuple):
         """Sums over the batches of all parts."""
         return cls(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
 
-    def record(
-        self, i: int, k: int, x: Array, estimate: Gaussian, weight: Array, starts: Array
-    ) -> None:
-        """Add step k of filter i: true states x (N, n), its estimate, the weights (N,), and where
-        the batches start."""
-        mean, cov = estimate
-        error, n = x - mean, x.shape[1]
-        square = error * error
-        own = np.broadcast_to(np.trace(cov, axis1=-2, axis2=-1), len(x))
-        if n == 1:  # a claimed variance of 0 is right for no error, and infinitely wrong for any
-            normalised = ratio(square[:, 0], own, np.where(square[:, 0] > 0, np.inf, 0.0))
-        else:
-            normalised = normalised_square(error, cov) / n
-        total = weight * square.sum(axis=1)
-        self.error[i, k] = np.add.reduceat(weight[:, None] * error, starts).T
-        self.square[i, k] = np.add.reduceat(weight[:, None] * square, starts).T
-        self.own[i, k] = np.add.reduceat(weight * own, starts)
-        self.normalised[i, k] = np.add.reduceat(weight * normalised, starts)
-        self.largest[i, k] = np.maximum.reduceat(total, starts)
-
     def means(self, name: str) -> Array:
         """Means of a field over all batches, and without each of them: (..., 1 + batches)."""
         return _without_each(getattr(self, name)) / _without_each(self.weight)
+
+
+def claimed(error: Array, cov: Array) -> tuple[Array, Array]:
+    """What a filter claims of its errors (runs, n): tr p, and e^T p^-1 e / n, (runs,)."""
+    n = error.shape[1]
+    own = np.broadcast_to(np.trace(cov, axis1=-2, axis2=-1), len(error))
+    if n > 1:
+        return own, normalised_square(error, cov) / n
+    # a claimed variance of 0 is right for no error, and infinitely wrong for any
+    square = error[:, 0] ** 2
+    return own, ratio(square, own, np.where(square > 0, np.inf, 0.0))
 
 
 def means_without_each(values: Array) -> Array:

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader
 
-from kfcourse.derivations import Report, check_text
-from kfcourse.derivations.verdicts import MARKS, Verdict
-from kfcourse.derivations.wording import DEFINITIONS, RULES
+from kfcourse.exercises.derivations import Report, check_text
+from kfcourse.exercises.derivations.verdicts import MARKS, Verdict
+from kfcourse.exercises.derivations.wording import DEFINITIONS, RULES
 from kfcourse.lab.variants import Variant, find_variant
 
 SCRIPT = Path(__file__).parent / "data" / "derive.js"

@@ -163,7 +163,7 @@ def estimate(
     ):
         raise NoMaximum(result.message, best, names)
     noise = 10 * np.finfo(float).eps * abs(result.fun) / STEP**2
-    variance, flat = _inverse(information, unit, names, max(TOGETHER, noise))
+    variance, flat = _inverse(information, unit, names, noise)
     error = np.sqrt(variance) * np.where(logs, parameters(t), 1.0)
     return Likeliest(names, parameters(t), error, -float(result.fun), best, flat)
 
@@ -272,7 +272,7 @@ def _derivatives(function: Callable[[Array], float], c: Array) -> tuple[Array, A
 
 
 def _inverse(
-    information: Array, unit: Array, names: Sequence[str], least: float
+    information: Array, unit: Array, names: Sequence[str], noise: float
 ) -> tuple[Array, tuple[str, ...]]:
     """Variances of the parameters, and a sentence for each direction without information.
 
@@ -289,7 +289,7 @@ def _inverse(
     scaled = information / np.outer(scale, scale)
     related = np.where(blind[:, None] | blind, np.eye(len(own)), scaled)
     values, directions = np.linalg.eigh(related)
-    known = values > least
+    known = values > max(TOGETHER, noise)
     variance = (directions[:, known] ** 2 / values[known]).sum(axis=1) * (unit / scale) ** 2
     variance[blind] = np.inf
     for direction in directions.T[~known]:

@@ -27,8 +27,9 @@ from tqdm import tqdm
 
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, structure_of
+from kfcourse.filters.gate import size_of
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, stacked
 from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import measurements, walk
 from kfcourse.records.evidence import log_densities
@@ -64,8 +65,8 @@ class Examination(NamedTuple):
     weight: Array
     passed: Array
     log_likelihood: Array
-    edge: float = 1.0
-    by_component: bool = False
+    edge: float
+    by_component: bool
 
 
 class Finding(NamedTuple):
@@ -82,32 +83,25 @@ class Finding(NamedTuple):
         return bool(self.low <= self.value <= self.high)
 
 
-def examine(
-    filter_: Filter, y: Array, edge: float = 1.0, by_component: bool = False
-) -> Examination:
+def examine(filter_: Filter, y: Array) -> Examination:
     """Run a filter over a record, look back, and keep what it expected.  A long record shows its
     progress.
 
     Parameters
     ----------
     filter_ : Filter
-        With structural functions of its own; `gated(...)` too, with its probability as `edge`,
-        above 0 and at most 1, and its `by_component`.
+        With structural functions of its own; `gated(...)` too.
     y : ndarray (steps, runs, p)
         As for `run`.
 
     Raises
     ------
     ValueError
-        A filter without structural functions, an edge that is no probability, measurements of
-        another shape, no likelihood (`kfcourse.likelihood`), a noise with a negative variance, as
-        sqrt(u) has where an input u is negative.
+        A filter without structural functions, measurements of another shape, no likelihood
+        (`kfcourse.likelihood`), a noise with a negative variance, as sqrt(u) has where an input u
+        is negative.
     """
     expect(filter_, Filter, "examine")
-    if not 0 < edge <= 1:
-        raise ValueError(
-            f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}"
-        )
     structure, y = structure_of(filter_, "an examination of a record"), measurements(filter_, y)
     visited = list(shown_progress(walk(filter_, y), "filter", len(y) + 1))
     innovations, F = np.empty(y.shape), np.empty((*y.shape, y.shape[-1]))
@@ -130,8 +124,8 @@ def examine(
         np.where(np.isnan(y).all(axis=-1), np.nan, weight),
         passed,
         log_densities(filter_, visited, y),
-        edge,
-        by_component,
+        getattr(visited[-1].memory, "edge", 1.0),
+        getattr(visited[-1].memory, "by_component", False),
     )
 
 
@@ -203,7 +197,7 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
         size = np.nansum(value**2 / np.diagonal(F, axis1=-2, axis2=-1)) / degrees.sum()
         mean, variance = (degrees * part for part in _below(np.ones(1), examined.edge))
     else:
-        size = _sizes(value, F).sum() / degrees.sum()
+        size = size_of(value, F).sum() / degrees.sum()
         mean, variance = _below(degrees, examined.edge)
     scale = variance.sum() / mean.sum()
     low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, TAILS) / degrees.sum()
@@ -219,12 +213,6 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
                 bound = z / np.sqrt(len(terms))
                 result.append(Finding(kind + name, float(terms.mean()), -bound, bound))
     return result
-
-
-def _sizes(value: Array, F: Array) -> Array:
-    """nu^T F^-1 nu of the components measured, (steps,)."""
-    innovation, _, F, _ = without_missing(value, np.zeros_like(F), F, F)
-    return normalised_square(innovation, F)
 
 
 def _below(degrees: Array, edge: float) -> tuple[Array, Array]:

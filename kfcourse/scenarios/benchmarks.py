@@ -221,17 +221,19 @@ def local_level(q: float = 1468.5, r: float = 15099.7) -> Model:
 
 def nile() -> Array:
     """Annual flow of the Nile at Aswan from 1871 to 1970, 10^8 m^3, (100, 1, 1)."""
-    text = (DATA / "nile.csv").read_text(encoding="utf-8")
-    return np.array([float(row.split(",")[1]) for row in text.split()[1:]])[:, None, None]
+    return _columns("nile.csv")[1][:, None, None]
 
 
 def jimenez_data(name: str) -> tuple[Array, Array]:
     """Instants (steps,) and measurements (steps, 1, 1) of "exact-mul" or "double-well"; licence:
     data/LICENSE-jimenez.txt."""
-    t, y = np.loadtxt(
-        (DATA / f"jimenez-{name}.csv").open(encoding="utf-8"), delimiter=",", skiprows=1
-    ).T
+    t, y = _columns(f"jimenez-{name}.csv")
     return t, y[:, None, None]
+
+
+def _columns(name: str) -> Array:
+    lines = (DATA / name).read_text(encoding="utf-8").splitlines()
+    return np.loadtxt(lines, delimiter=",", skiprows=1).T
 
 
 def exact_mul(a: float, b: float, **options: Any) -> Model:

@@ -49,15 +49,8 @@ def recorded() -> Drive:
     x = r cos(phi_0) (lambda - lambda_0),   y = r (phi - phi_0)       latitude phi, longitude
     lambda, in rad
     """
-    text = (resources.files("kfcourse.scenarios") / "data" / "car-2014-03-26.csv").read_text(
-        encoding="utf-8"
-    )
-    names, *rows = (line.split(",") for line in text.splitlines())
-    table = dict(
-        zip(
-            names, np.array([[float(cell or "nan") for cell in row] for row in rows]).T, strict=True
-        )
-    )
+    file = resources.files("kfcourse.scenarios") / "data" / "car-2014-03-26.csv"
+    table = np.genfromtxt(file.read_text("utf-8").splitlines(), delimiter=",", names=True)
     latitude, longitude = np.radians(table["latitude_deg"]), np.radians(table["longitude_deg"])
     east = RADIUS * np.cos(latitude[0]) * (longitude - longitude[0])
     course = np.pi / 2 - np.radians(table["course_deg"])

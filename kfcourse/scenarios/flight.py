@@ -20,14 +20,18 @@ acceleration are continuous.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from kfcourse.errors import expect_positive
 from kfcourse.laws import Array
 
+STEP = Polynomial([0, 0, 3, -2])  # from 0 to 1 over 0 <= u <= 1, with zero slope at both ends
+START = np.array([-15_000.0, 25_000.0, 8_500.0])  # m; the first course is along x
+TURNS = (1.5 * np.pi, np.pi)  # rad; of parts 2 and 4, to the left
+DURATIONS = (120.0, 60.0, 100.0)  # s; of parts 1, 3 and 5
 PIECE = 1.0  # s; the horizontal path is integrated over pieces not longer than this
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
@@ -60,12 +64,8 @@ class Track(NamedTuple):
 def aircraft(
     interval: float,
     *,
-    start: Sequence[float] = (-15_000.0, 25_000.0, 8_500.0),
-    heading: float = 0.0,
     speeds: tuple[float, float] = (200.0, 130.0),
     radii: tuple[float, float] = (6_000.0, 10_000.0),
-    turns: tuple[float, float] = (1.5 * np.pi, np.pi),
-    durations: tuple[float, float, float] = (120.0, 60.0, 100.0),
     descent: float = 10.0,
     ramp: float = 8.0,
 ) -> Track:
@@ -75,18 +75,10 @@ def aircraft(
     ----------
     interval : float
         Time between samples, s.
-    start : (x, y, z)
-        First position, m.
-    heading : float
-        First heading, rad from the x axis towards y.
     speeds : (V1, V2)
         Horizontal speed before and after part 3, m/s.
     radii : (r1, r2)
-        Radii of the circles of parts 2 and 4, m.
-    turns : (angle, angle)
-        By how much parts 2 and 4 turn the heading, rad; positive to the left.
-    durations : (s, s, s)
-        Of parts 1, 3 and 5.  Parts 2 and 4 last |angle| r / V + ramp.
+        Radii of the circles of parts 2 and 4, m.  These last `TURNS` r / V + ramp.
     descent : float
         Speed of descent in parts 4 and 5, m/s.
     ramp : float
@@ -101,22 +93,17 @@ def aircraft(
     Raises
     ------
     ValueError
-        A number that is not finite or has the wrong sign, a manoeuvre shorter than its two ramps, a
-        flight that ends below the ground.
+        A number that is not positive and finite, a manoeuvre shorter than its two ramps, a flight
+        that ends below the ground.
     """
-    given = {"start": start, "turns": turns, "heading and descent": (heading, descent)}
-    lengths_and_speeds = {"speeds": speeds, "radii": radii, "durations": durations}
-    for name, values in (given | lengths_and_speeds).items():
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name} must be finite numbers, got {values!r}")
-    expect_positive(**{name: min(values) for name, values in lengths_and_speeds.items()})
     expect_positive(interval=interval, ramp=ramp)
+    for pair in zip(speeds, radii, strict=True):
+        expect_positive(**dict(zip(("speeds", "radii"), pair, strict=True)))
 
-    circles = [
-        abs(angle) * radius / speed
-        for angle, radius, speed in zip(turns, radii, speeds, strict=True)
-    ]
-    lengths = [durations[0], circles[0] + ramp, durations[1], circles[1] + ramp, durations[2]]
+    # Turn rates and the loss of speed: each rises, stays and falls inside its part.
+    rates = [speed / radius for speed, radius in zip(speeds, radii, strict=True)]
+    circles = [angle / rate + ramp for angle, rate in zip(TURNS, rates, strict=True)]
+    lengths = [DURATIONS[0], circles[0], DURATIONS[1], circles[1], DURATIONS[2]]
     for number, length in zip((2, 3, 4, 5), lengths[1:], strict=True):
         if length < 2 * ramp:
             raise ValueError(
@@ -126,17 +113,12 @@ def aircraft(
     ends = np.cumsum(lengths)
     time = interval * np.arange(int(ends[-1] / interval * (1 + 1e-12)) + 1)
 
-    # Turn rates and the loss of speed: each rises, stays and falls inside its part.
-    rates = [
-        np.sign(angle) * speed / radius
-        for angle, speed, radius in zip(turns, speeds, radii, strict=True)
-    ]
     deceleration = (speeds[0] - speeds[1]) / (lengths[2] - ramp)
 
     def speed_and_heading(t: Array) -> tuple[Array, Array]:
         first, second = (_plateau_integral(t, ends[i], ends[i + 1], ramp) for i in (0, 2))
         speed = speeds[0] - deceleration * _plateau_integral(t, ends[1], ends[2], ramp)
-        return speed, heading + rates[0] * first + rates[1] * second
+        return speed, rates[0] * first + rates[1] * second
 
     speed, psi = speed_and_heading(time)
     turn_rate = rates[0] * _plateau(time, ends[0], ends[1], ramp) + rates[1] * _plateau(
@@ -147,36 +129,30 @@ def aircraft(
     forward = np.stack([np.cos(psi), np.sin(psi)], axis=-1)
     left = np.stack([-np.sin(psi), np.cos(psi)], axis=-1)
 
-    altitude = start[2] - descent * ramp * _step_integral(since)
-    if altitude.min() <= 0:
+    altitude = START[2] - descent * ramp * _step_integral(since)
+    if not altitude.min() > 0:
         raise ValueError(
-            f"the aircraft would end at the altitude {altitude[-1]:.4g} m; start higher, lower "
-            f"`descent` or shorten parts 4 and 5"
+            f"the aircraft would end at the altitude {altitude[-1]:.4g} m; lower `descent`, "
+            f"or make the circle of part 4 smaller"
         )
     knots = np.concatenate([ends[:-1], ends[:-1] + ramp, ends[1:-1] - ramp])
     path = _path(time, knots, speed_and_heading)
-    position = np.column_stack([np.add(start[:2], path), altitude])
+    position = np.column_stack([START[:2] + path, altitude])
     velocity = np.column_stack([speed[:, None] * forward, -descent * _step(since)])
     horizontal = slowing[:, None] * forward + (speed * turn_rate)[:, None] * left
-    acceleration = np.column_stack([horizontal, -descent / ramp * _step_slope(since)])
+    acceleration = np.column_stack(
+        [horizontal, -descent / ramp * STEP.deriv()(np.clip(since, 0.0, 1.0))]
+    )
     part = 1 + np.searchsorted(ends[:-1], time, side="right")
     return Track(time, position, velocity, acceleration, part)
 
 
 def _step(u: Array) -> Array:
-    """From 0 to 1 over 0 <= u <= 1, with zero slope at both ends."""
-    u = np.clip(u, 0.0, 1.0)
-    return u**2 * (3 - 2 * u)
-
-
-def _step_slope(u: Array) -> Array:
-    u = np.clip(u, 0.0, 1.0)
-    return 6 * u * (1 - u)
+    return STEP(np.clip(u, 0.0, 1.0))
 
 
 def _step_integral(u: Array) -> Array:
-    rising = np.clip(u, 0.0, 1.0)
-    return rising**3 - rising**4 / 2 + np.maximum(u - 1.0, 0.0)
+    return STEP.integ()(np.clip(u, 0.0, 1.0)) + np.maximum(u - 1.0, 0.0)
 
 
 def _plateau(t: Array, start: float, end: float, ramp: float) -> Array:

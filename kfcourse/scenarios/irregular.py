@@ -4,7 +4,7 @@ grossly wrong.
     x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis
     y_k = `position` + w_k,           w_k ~ N(0, sigma^2)
 
-White acceleration of intensity q pushes the track; an outlier has `times` the deviation sigma.
+White acceleration of intensity q pushes the track; an outlier has `TIMES` the deviation sigma.
 """
 
 from __future__ import annotations
@@ -13,10 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.errors import expect_positive, expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.model import Model
+
+STEPS = 300
+# shares of the fixes that are missing, and of the others that are grossly wrong
+MISSING, OUTLIERS = 0.15, 0.05
+TIMES = 20.0  # how many times larger an outlier's errors are, on the average
 
 
 class IrregularTrack(NamedTuple):
@@ -46,38 +50,18 @@ class IrregularTrack(NamedTuple):
 def irregular_track(
     seed: int | np.random.Generator,
     runs: int = 1,
-    steps: int = 300,
-    missing: float = 0.15,
-    outliers: float = 0.05,
-    times: float = 20.0,
 ) -> IrregularTrack:
-    """Tracks of unequal intervals, 0.1 to 1.5 s, of whose fixes a part is missing and a part
-    grossly wrong.
+    """Tracks of 300 steps of unequal lengths, 0.1 to 1.5 s, of whose fixes a part is missing and a
+    part grossly wrong.
 
     Parameters
     ----------
     seed : int or numpy.random.Generator
     runs : int
         Records with the same times.
-    steps : int
-    missing, outliers : float
-        The share of the fixes that is missing, and of the others that is grossly wrong: between 0
-        and 1.
-    times : float
-        How many times larger an outlier's errors are, on the average.
-
-    Raises
-    ------
-    ValueError
-        Shares that are none; numbers of runs, steps or times that are not positive.
     """
-    expect_sizes(runs=runs, steps=steps)
-    for name, share in (("missing", missing), ("outliers", outliers)):
-        if not 0 <= share <= 1:
-            raise ValueError(f"{name} is a share of the fixes, between 0 and 1; got {share}")
-    expect_positive(times=times)
     rng = np.random.default_rng(seed)
-    interval = rng.uniform(0.1, 1.5, steps)
+    interval = rng.uniform(0.1, 1.5, STEPS)
     model = Model.define(
         [
             "x + dt*v_x + sqrt(q*dt**3)*(v1/2 + v3/sqrt(12))",
@@ -91,9 +75,9 @@ def irregular_track(
         prior={"mean": [0, 0, 10, 0], "variance": [100, 100, 25, 25]},
         inputs={"dt": interval.tolist()},
     )
-    x, y = simulate(model, runs, steps, seed=int(rng.integers(2**63)))
-    wrong = rng.random((steps, runs)) < outliers
-    fixes = x[..., :2] + (y - x[..., :2]) * np.where(wrong, times, 1.0)[..., None]
-    gone = rng.random((steps, runs)) < missing
+    x, y = simulate(model, runs, STEPS, seed=int(rng.integers(2**63)))
+    wrong = rng.random((STEPS, runs)) < OUTLIERS
+    fixes = x[..., :2] + (y - x[..., :2]) * np.where(wrong, TIMES, 1.0)[..., None]
+    gone = rng.random((STEPS, runs)) < MISSING
     time = np.concatenate([[0.0], np.cumsum(interval[:-1])])
     return IrregularTrack(model, time, x, np.where(gone[..., None], np.nan, fixes), wrong & ~gone)

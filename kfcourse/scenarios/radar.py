@@ -32,18 +32,8 @@ CARTESIAN = sp.ImmutableMatrix(
     ]
 )
 
-_to_spherical = compile_function(
-    "spherical",
-    {"position": sp.Matrix([X, Y, Z])},
-    {"measured": SPHERICAL},
-    ["position", "measured"],
-).function
-_to_cartesian = compile_function(
-    "cartesian",
-    {"measured": sp.Matrix([RANGE, AZIMUTH, ELEVATION])},
-    {"position": CARTESIAN},
-    ["measured", "position"],
-).function
+_to_spherical = compile_function([[X, Y, Z]], [list(SPHERICAL)])
+_to_cartesian = compile_function([[RANGE, AZIMUTH, ELEVATION]], [list(CARTESIAN)])
 
 
 def spherical(position: Array) -> Array:
@@ -117,56 +107,36 @@ def _noisy(
 
 
 def kinematic(
-    interval: float,
-    *,
-    dimensions: int = 3,
-    order: int = 1,
-    noise_sd: float = 1.0,
-    measurement_sd: float = 1.0,
-    prior: dict[str, Array] | None = None,
+    interval: float, *, dimensions: int = 3, noise_sd: float = 1.0, measurement_sd: float = 1.0
 ) -> Model:
-    """Motion with a highest derivative that changes at random, its position measured.
+    """Motion with a velocity that is nearly constant, its position measured.
 
-    order 1: velocity nearly constant.  The acceleration v_k is constant over an interval T, and
-    independent of the last:
+    The acceleration v_k is constant over an interval T, and independent of the last:
 
         r' = r + T s + T^2/2 v,   s' = s + T v
-
-    order 2: acceleration nearly constant.  v_k is its increment:
-
-        r' = r + T s + T^2/2 (a + v),   s' = s + T (a + v),   a' = a + v
 
     Parameters
     ----------
     interval : float
         T, s.
     dimensions : int
-        1, 2 or 3.  The state is (x, y, z, vx, vy, vz), then ax, ay, az.
-    order : int
-        1 or 2.
+        1, 2 or 3.  The state is (x, y, z, vx, vy, vz).
     noise_sd, measurement_sd : float
         Standard deviations of v_k, m/s^2, and of the measurements, m.
-    prior : dict, optional
-        Law of the first state, as in `Model.define`.
     """
-    if dimensions not in (1, 2, 3) or order not in (1, 2):
-        raise ValueError(
-            f"dimensions must be 1, 2 or 3 and order 1 or 2, got {dimensions} and {order}"
-        )
+    if dimensions not in (1, 2, 3):
+        raise ValueError(f"dimensions must be 1, 2 or 3, got {dimensions}")
     expect_positive(interval=interval)
     expect_not_negative(noise_sd=noise_sd, measurement_sd=measurement_sd)
-    names = [prefix + axis for prefix in ("", "v", "a")[: order + 1] for axis in "xyz"[:dimensions]]
-    T, state = symbol("T"), sp.Matrix([symbol(name) for name in names])
-    r, s = state[:dimensions, :], state[dimensions : 2 * dimensions, :]
-    a = sp.Matrix([symbol(f"v{i + 1}") for i in range(dimensions)])
-    a += state[2 * dimensions :, :] if order == 2 else sp.zeros(dimensions, 1)
-    equations = [*(r + T * s + T**2 / 2 * a), *(s + T * a), *(a if order == 2 else [])]
+    axes = range(1, dimensions + 1)
+    places, speeds = "xyz"[:dimensions], [f"v{axis}" for axis in "xyz"[:dimensions]]
+    motion = zip(places, speeds, axes, strict=True)
     return Model.define(
-        equations,
-        [ri + symbol(f"w{i + 1}") for i, ri in enumerate(r)],
+        [f"{r} + T*{s} + T**2/2*v{i}" for r, s, i in motion]
+        + [f"{s} + T*v{i}" for s, i in zip(speeds, axes, strict=True)],
+        [f"{r} + w{i}" for r, i in zip(places, axes, strict=True)],
         {"T": interval},
-        symbols={"x": names},
-        prior=prior,
+        symbols={"x": [*places, *speeds]},
         state_noise={"variance": float(noise_sd) ** 2},
         meter_noise={"variance": float(measurement_sd) ** 2},
     )

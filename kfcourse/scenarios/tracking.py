@@ -31,7 +31,7 @@ def roughly_known(
     Parameters
     ----------
     system : LinearSystem
-        Of `kfcourse.scenarios.radar.kinematic(..., order=1)`.
+        Of `kfcourse.scenarios.radar.kinematic(...)`.
     first_gain : float
         Psi_11 / (Psi_11 + sigma^2), between 1/2 and 1.
     state : ndarray (n,)
@@ -53,7 +53,7 @@ def roughly_known(
     axes = len(system.H)
     if np.shape(state) != (len(system.A),) or len(system.A) != 2 * axes:
         raise ValueError(
-            f"expected positions and speeds of {axes} axes, kinematic(..., order=1), and a state "
+            f"expected positions and speeds of {axes} axes, kinematic(...), and a state "
             f"({2 * axes},); "
             f"got a system of {len(system.A)} components and a state {np.shape(state)}"
         )

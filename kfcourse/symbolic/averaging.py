@@ -24,7 +24,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, tra
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, expect_each, of_steps
+from kfcourse.symbolic.structure import Structure, expect_each
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -46,7 +46,7 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
             f"{len(structures)}"
         )
 
-    return of_steps("averaged", model.modes[0], partial(_at, model, structures), timed=True)
+    return Structure("averaged", model.modes[0], at_step=partial(_at, model, structures))
 
 
 def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:
@@ -54,21 +54,21 @@ def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:
     before, after = model.law_at(k), model.law_at(k + 1)
     now = [structure.at(k) for structure in structures]
 
+    def moved(z: Array, p: Array) -> tuple[Array, Array, Array]:
+        parts = [(structure.predict(z, p).mean, *structure.transition(z, p)) for structure in now]
+        return _mixed(after, parts, p)
+
     def predict(z: Array, p: Array) -> Gaussian:
-        laws = [structure.predict(z, p) for structure in now]
-        tau = _mean(after, [law.mean for law in laws])
-        return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
+        tau, A, Q = moved(z, p)
+        return Gaussian(tau, _form(A, p) + Q)
 
     def measure(m: Array, d: Array) -> Measurement:
         parts = [structure.measure(m, d) for structure in now]
-        slopes = [part.G for part in parts]
-        h, G, R = _mixed(before, [part.h for part in parts], slopes, [part.R for part in parts], d)
+        h, G, R = _mixed(before, [(part.h, part.G, part.R) for part in parts], d)
         return Measurement(h, G, _form(G, d) + R, R)
 
     def transition(z: Array, p: Array) -> Transition:
-        taus = [structure.predict(z, p).mean for structure in now]
-        slopes, rests = zip(*(structure.transition(z, p) for structure in now), strict=True)
-        return Transition(*_mixed(after, taus, slopes, rests, p)[1:])
+        return Transition(*moved(z, p)[1:])
 
     return Structure("averaged", model.modes[0], predict, measure, transition)
 
@@ -77,18 +77,16 @@ def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
     """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j;
     errors as of `averaged`."""
     _check(model)
-    each = [compile_noiseless(mode) for mode in model.modes]
+    states, meters = zip(*map(compile_noiseless, model.modes), strict=True)
 
     def state(x: Array, k: int | None = None) -> Array:
-        return sum(
-            q * np.broadcast_to(equation(x, k), x.shape)
-            for q, (equation, _) in zip(model.law_at((k or 0) + 1), each, strict=True)
-        )
+        k = k or 0
+        values = [np.broadcast_to(equation(x, k), x.shape) for equation in states]
+        return _mean(model.law_at(k + 1), values)
 
     def meter(x: Array, k: int | None = None) -> Array:
-        return sum(
-            q * equation(x, k) for q, (_, equation) in zip(model.law_at(k or 0), each, strict=True)
-        )
+        k = k or 0
+        return _mean(model.law_at(k), [equation(x, k) for equation in meters])
 
     return state, meter
 
@@ -104,28 +102,21 @@ def _check(model: JumpModel) -> None:
 
 
 def _mixed(
-    weights: Array,
-    means: Sequence[Array],
-    slopes: Sequence[Array],
-    rests: Sequence[Array],
-    cov: Array,
+    weights: Array, parts: Sequence[tuple[Array, Array, Array]], cov: Array
 ) -> tuple[Array, Array, Array]:
     """Mean, slope, and covariance that the slope does not explain, of affine functions with these
     weights over a law with this covariance."""
+    means, slopes, _ = zip(*parts, strict=True)
     mean, slope = _mean(weights, means), _mean(weights, slopes)
-    spreads = [
-        rest + _form(own - slope, cov) + _square(value - mean)
-        for value, own, rest in zip(means, slopes, rests, strict=True)
-    ]
+    spreads = []
+    for value, own, rest in parts:
+        off = (value - mean)[..., None]
+        spreads.append(rest + _form(own - slope, cov) + product(off, transpose(off)))
     return mean, slope, _mean(weights, spreads)
 
 
 def _mean(weights: Array, values: Sequence[Array]) -> Array:
     return sum((q * value for q, value in zip(weights, values, strict=True)), np.zeros(()))
-
-
-def _square(vector: Array) -> Array:
-    return vector[..., :, None] * vector[..., None, :]
 
 
 def _form(matrix: Array, cov: Array) -> Array:

@@ -8,7 +8,6 @@ from typing import TypeAlias
 import sympy as sp
 
 from kfcourse.laws import Array
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 
 # a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends on
@@ -23,10 +22,10 @@ def compile_model(model: Model) -> tuple[Equation, Equation]:
 
     Those of a model that depends on the step need it: `state(x, v, k)`.
     """
-    meter = _compiled("meter", model.meter_equation, "w", model.w, model)
+    meter = _compiled(model.meter_equation, model.w, model)
     if model.between is not None:
         return model.between.motion(model), meter
-    return _compiled("state", model.state_equation, "v", model.v, model), meter
+    return _compiled(model.state_equation, model.v, model), meter
 
 
 def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
@@ -37,10 +36,6 @@ def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
     return lambda x, k=None: state(x, v, k), lambda x, k=None: meter(x, w, k)
 
 
-def _compiled(
-    name: str, equation: sp.MatrixBase, letter: str, noise: tuple[sp.Symbol, ...], model: Model
-) -> Equation:
-    arguments = {"x": sp.Matrix(model.x), letter: sp.Matrix(noise)}
-    numeric = {name: equation.subs(model.values)}
-    function = Stepwise.compile(model.known, name, arguments, numeric, [*arguments, name])
+def _compiled(equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], model: Model) -> Equation:
+    function = model.compiled([model.x, noise], [list(equation)])
     return lambda x, noise, k=None: function.at(k)(x, noise)[0]

@@ -158,30 +158,25 @@ def syntax(formula: str) -> tuple[str, ast.expr, int]:
     return formula, tree, offset
 
 
-# Typed for what formulas are made of: Cyrillic letters that look Latin, and signs of printed
-# mathematics.
-_LOOKS_LIKE = dict(zip("асеорхуАВСЕНКМОРТХ−–·×⋅∙÷", "aceopxyABCEHKMOPTX--****/", strict=True))
-_INSTEAD = {"^": "** for a power (x**2)", "#": "comments elsewhere"}
+# Typed for what formulas are made of: signs of printed mathematics, and Cyrillic letters that look
+# Latin.
+_INSTEAD = {"^": "** for a power (x**2)", "#": "comments elsewhere", "²": "**2", "³": "**3"} | {
+    typed: f"{plain} of the English keyboard"
+    for typed, plain in zip("асеорхуАВСЕНКМОРТХ−–·×⋅∙÷", "aceopxyABCEHKMOPTX--****/", strict=True)
+}
 
 
 def _check_characters(formula: str) -> None:
     """FormulaError at the first character that formulas have not: Python would take ſ for s, and
     end at #."""
     for column, character in enumerate(formula):
-        if character.isascii() and character.isprintable() and character not in "^#":
-            continue
-        plain = _LOOKS_LIKE.get(character, unicodedata.normalize("NFKC", character))
-        plain = f"**{plain}" if unicodedata.category(character) == "No" else plain  # x²
-        instead = _INSTEAD.get(character) or (
-            f"{plain} of the English keyboard" if plain.isascii() and plain.isprintable() else ""
-        )
-        name = unicodedata.name(character, f"U+{ord(character):04X}").lower()
-        shown = character if character.isprintable() else "a character"
-        raise FormulaError(
-            formula,
-            f"{shown} ({name}) has no meaning in a formula{'; write ' * bool(instead)}{instead}",
-            column,
-        )
+        if not (character.isascii() and character.isprintable()) or character in "^#":
+            cure = f"; write {_INSTEAD[character]}" if character in _INSTEAD else ""
+            name = unicodedata.name(character, f"U+{ord(character):04X}").lower()
+            shown = character if character.isprintable() else "a character"
+            raise FormulaError(
+                formula, f"{shown} ({name}) has no meaning in a formula{cure}", column
+            )
 
 
 class Reader:
@@ -292,11 +287,7 @@ class Reader:
             )
         count = ARGUMENTS.get(node.func.id, 1)
         if node.keywords or len(node.args) != count:
-            raise self.fail(
-                node,
-                f"{node.func.id} takes exactly "
-                f"{'one argument' if count == 1 else f'{count} arguments'}",
-            )
+            raise self.fail(node, f"{node.func.id} takes {count} argument{'s' * (count > 1)}")
         if self.nested >= MAX_NESTED:
             raise self.fail(node, f"functions are nested more than {MAX_NESTED} deep")
         self.nested += 1

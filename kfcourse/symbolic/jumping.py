@@ -12,7 +12,7 @@ code are derived as any model's are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -34,7 +34,6 @@ from kfcourse.symbolic.reading import (
     shown,
     table,
 )
-from kfcourse.symbolic.typesetting import aligned
 
 # in which modes may differ
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")
@@ -203,16 +202,6 @@ class JumpModel:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
 
-    def latex(self) -> str:
-        """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned`
-        block."""
-        lines = []
-        for name, mode in zip(self.names, self.modes, strict=True):
-            title = name.replace("_", r"\_")
-            lines += [rf"\text{{mode {title}:}}\quad &", *mode.lines()]
-        first = sp.Matrix([[sp.Float(share, 4) for share in self.first]])
-        return aligned([*lines, rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"])
-
     def __repr__(self) -> str:
         texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
         pairs = zip(self.names, texts, strict=True)
@@ -284,8 +273,8 @@ def _compiled(rows: Array, model: Model, changed: set[str]) -> tuple[sp.Immutabl
         )
     except (ModelError, FormulaError) as error:
         raise ModelError(f"`transition`: {error}") from None
-    numeric, known = {"transition": matrix.subs(model.values)}, model.known.used(matrix, of_step)
-    return matrix, Stepwise.compile(known, "transition", {"x": sp.Matrix(model.x)}, numeric, ["x"])
+    model = replace(model, known=model.known.used(matrix, of_step))
+    return matrix, model.compiled([model.x], [matrix])
 
 
 def _law(first: Any, size: int) -> Array:

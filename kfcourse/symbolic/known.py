@@ -15,7 +15,6 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
     ModelError,
@@ -120,35 +119,20 @@ class Stepwise(NamedTuple):
     """A generated function, and what is known of every step: the function's last argument, if its
     formulas contain any of it."""
 
-    compiled: Compiled
+    function: Callable[..., tuple[Array, ...]]
     known: Known
-
-    @classmethod
-    def compile(
-        cls,
-        known: Known,
-        name: str,
-        arguments: Mapping[str, sp.MatrixBase],
-        outputs: Mapping[str, sp.MatrixBase],
-        vectors: Sequence[str],
-    ) -> Stepwise:
-        """Arguments as of `compile_function`."""
-        if known.symbols:
-            arguments = {**arguments, "known": sp.Matrix(known.symbols)}
-        return cls(compile_function(name, arguments, outputs, [*vectors, "known"]), known)
 
     def at(self, k: int | None) -> Callable[..., Any]:
         """The function at step k."""
-        function = self.compiled.function
         if not self.known.symbols:
-            return function
+            return self.function
         if k is None:
             raise ModelError(
                 "the model depends on the step: say which, as in structure.at(k) or "
                 "equation(x, v, k)"
             )
         values = self.known.at(k)
-        return lambda *arrays: function(*arrays, values)
+        return lambda *arrays: self.function(*arrays, values)
 
 
 def varying_law(

@@ -24,9 +24,9 @@ import sympy as sp
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees
-from kfcourse.symbolic.codegen import check_numbers
+from kfcourse.symbolic.codegen import Entries, check_numbers, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
-from kfcourse.symbolic.known import Known, varying_law
+from kfcourse.symbolic.known import Known, Stepwise, varying_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -243,6 +243,13 @@ class Model:
     def measured(self) -> list[str]:
         """Names of the measurement's components: y, or y1, y2, ..."""
         return _measured(self.p)
+
+    def compiled(self, arguments: Sequence[Entries], outputs: Sequence[Entries]) -> Stepwise:
+        """A function of arrays for each step, as of `compile_function`, with the parameters'
+        values."""
+        numeric = [sp.Array(entries).subs(self.values) for entries in outputs]
+        known = [self.known.symbols] if self.timed else []
+        return Stepwise(compile_function([*arguments, *known], numeric), self.known)
 
     def replace(self, **parameters: float) -> Model:
         """The same model with some parameters changed: ``model.replace(f=0.2)``; ModelError where

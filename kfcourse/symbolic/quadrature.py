@@ -18,7 +18,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import sympy as sp
 
-from kfcourse.angles import Components, difference, near, on_circle
+from kfcourse.angles import Components, difference, on_circle
 from kfcourse.errors import expect
 from kfcourse.laws import (
     SINGULAR,
@@ -232,8 +232,7 @@ def _side(
     for _ in noises:  # and what is correlated with one of them
         pointed |= (law.cov[:, pointed] != 0).any(axis=1)
     cov = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
-    added = {"added": factors * cov * factors.T}
-    stepwise = Stepwise.compile(model.known, "added", {"x": sp.Matrix(model.x)}, added, ["x"])
+    stepwise = model.compiled([model.x], [factors * cov * factors.T])
     root = np.eye(len(noises))[:, pointed] @ square_root(law.cov[np.ix_(pointed, pointed)])
     return _Side(model, function, law.mean, root, stepwise, angles, len(equation))
 
@@ -273,22 +272,24 @@ def _disagreement(model: Model, name: str, order: int, sides: Sequence[_Side]) -
         coarse, fine = (_at_prior(_by_points(name, model, rule, sides)) for rule in rules)
     parts = zip(("next state", "measurement"), coarse, fine, model.angles, strict=True)
     for what, less, more, angles in parts:
-        # rounding: what does not vary has no size of its own
-        sd = np.sqrt(np.maximum(np.diagonal(more.cov), 0.0)) + 1e-12 * (1 + np.abs(more.mean))
-        pairs = (
-            ("mean", less.mean, near(more.mean, less.mean, angles), sd),
-            ("covariance", less.cov, more.cov, np.outer(sd, sd)),
-        )
-        for moment, before, after, scale in pairs:
-            apart = np.nan_to_num(np.abs(after - before) / scale, nan=np.inf)
-            if apart.max() > CONVERGED:
-                worst = np.unravel_index(np.argmax(apart), apart.shape)
+        for moment, error in zip(("mean", "covariance"), apart(less, more, angles), strict=True):
+            if not (largest := np.abs(error).max()) <= CONVERGED:
                 return (
-                    f"{name}: the {moment} of the {what} of {model} at the prior law is "
-                    f"{before[worst]:.4g} with {order} points an axis and {after[worst]:.4g} with "
-                    f"{2 * order}: it may be infinite, or the function too rough for these points"
+                    f"{name}: with {2 * order} points an axis in place of {order} the {moment} of "
+                    f"the {what} of {model} at the prior law changes by {100 * largest:.2g} %: it "
+                    "may be infinite, or the function too rough for these points"
                 )
     return ""
+
+
+def apart(less: Gaussian, more: Gaussian, angles: Components) -> tuple[Array, Array]:
+    """How far two laws lie apart: the means, in standard deviations of the second, and the
+    covariances, in products of two of these."""
+    # what does not vary has no size of its own but that of rounding
+    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0))
+    sd = sd + 1e-12 * (1 + np.abs(more.mean))
+    spread = (less.cov - more.cov) / (sd[..., :, None] * sd[..., None, :])
+    return difference(less.mean, more.mean, angles) / sd, spread
 
 
 def _at_prior(structure: Structure) -> tuple[Gaussian, Gaussian]:

@@ -44,6 +44,12 @@ FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "
 FUNCTION_LATEX |= {"tau_dot": r"\dot\tau", "A": "A", "Theta_dot": r"\dot\Theta", "p_dot": r"\dot p"}
 
 
+def _at_no_step(mean: Vectors, cov: Matrices) -> NoReturn:
+    raise ModelError(
+        "the model depends on the step: say which, as in structure.at(k).predict(z, p)"
+    )
+
+
 @dataclass(frozen=True)
 class Structure:
     """The structural functions of a model, as functions of arrays and (if derived) as formulas.
@@ -70,9 +76,9 @@ class Structure:
 
     name: str
     model: Model
-    predict: Callable[[Vectors, Matrices], Gaussian]
-    measure: Callable[[Vectors, Matrices], Measurement]
-    transition: Callable[[Vectors, Matrices], Transition]
+    predict: Callable[[Vectors, Matrices], Gaussian] = _at_no_step
+    measure: Callable[[Vectors, Matrices], Measurement] = _at_no_step
+    transition: Callable[[Vectors, Matrices], Transition] = _at_no_step
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
 
@@ -122,15 +128,6 @@ class Structure:
                 first, *further = formula_lines(matrix[i, j], arguments, value)
                 lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]
         return aligned(lines)
-
-    def source(self) -> str:
-        """The generated NumPy code that runs."""
-        formulas = self._derived()
-        return (
-            formulas.compiled_predict.compiled.source
-            + "\n\n"
-            + formulas.compiled_measure.compiled.source
-        )
 
     def _derived(self) -> StructuralFormulas:
         if self.formulas is None:
@@ -189,28 +186,19 @@ class StructuralFormulas:
 
     @cached_property
     def compiled_predict(self) -> Stepwise:
-        return self._compile(
-            "predict",
-            {"z": self.z, "p": self.p},
-            {key: self.functions[key] for key in ("tau", "Theta")},
-        )
+        tau, Theta = self.functions["tau"], self.functions["Theta"]
+        return self.model.compiled([list(self.z), self.p], [list(tau), Theta])
 
     @cached_property
     def compiled_measure(self) -> Stepwise:
         """h, G, R, and G d G^T: F is their sum."""
-        G = self.functions["G"]
-        outputs = {"h": self.functions["h"], "G": G, "R": self.R, "explained": G * self.d * G.T}
-        return self._compile("measure", {"m": self.m, "d": self.d}, outputs)
+        h, G = self.functions["h"], self.functions["G"]
+        outputs = [list(h), G, self.R, G * self.d * G.T]
+        return self.model.compiled([list(self.m), self.d], outputs)
 
     @cached_property
     def compiled_transition(self) -> Stepwise:
-        return self._compile("transition", {"z": self.z, "p": self.p}, {"A": self.A, "Q": self.Q})
-
-    def _compile(
-        self, name: str, arguments: dict[str, sp.MatrixBase], outputs: dict[str, sp.MatrixBase]
-    ) -> Stepwise:
-        numeric = {key: part.subs(self.model.values) for key, part in outputs.items()}
-        return Stepwise.compile(self.model.known, name, arguments, numeric, ["z", "m", "tau", "h"])
+        return self.model.compiled([list(self.z), self.p], [self.A, self.Q])
 
     def structure(self) -> Structure:
         """The structure; of a model that depends on the step, one that must be told which."""
@@ -244,22 +232,10 @@ def of_steps(
     model: Model,
     at: Callable[[Any], Structure],
     formulas: StructuralFormulas | None = None,
-    timed: bool = False,
 ) -> Structure:
-    """The structure at every step; of what depends on the step the structure that `Structure.at`
-    makes those of each step of."""
-
-    def refused(mean: Vectors, cov: Matrices) -> NoReturn:
-        raise ModelError(
-            f"what is found of {model} depends on the step: say which, as in "
-            f"structure.at(k).predict(z, p)"
-        )
-
-    return (
-        Structure(name, model, refused, refused, refused, formulas, at)
-        if timed or model.timed
-        else at(None)
-    )
+    """The structure at every step; of a model that depends on the step the structure whose
+    `Structure.at` makes those of each step."""
+    return Structure(name, model, formulas=formulas, at_step=at) if model.timed else at(None)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:

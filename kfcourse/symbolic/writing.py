@@ -30,12 +30,7 @@ def formula_latex(
     noises : sequence of symbols
         Variables that are written last in a product, and whose terms are written last in a sum.
     """
-    printer = Printer({"order": "none", "fold_func_brackets": True})
-    return str(
-        printer.doprint(
-            _Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))
-        )
-    )
+    return _Writer(variables, noises).doprint(_readable(sp.sympify(expression)))
 
 
 def formula_lines(
@@ -48,8 +43,8 @@ def formula_lines(
     width = WIDTH - symbols(before)
     if symbols(whole) <= width or not isinstance(expression, sp.Add):
         return [whole]
-    terms = _Writer(variables, ()).terms(expression)
-    return joined([formula_latex(term, variables) for term in terms], width)
+    writer = _Writer(variables)
+    return joined([writer.doprint(term) for term in writer.terms(expression)], width)
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:
@@ -95,26 +90,20 @@ def number_latex(value: float) -> str:
     return f"{factor}10^{{{int(power)}}}"
 
 
-class _Writer:
-    """Rebuilds an expression with its sums and products in a given order, which the printer
-    keeps."""
+class _Writer(Printer):
+    """Prints sums and products in the course's order."""
 
-    def __init__(self, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol]) -> None:
-        self.rank = {symbol: place for place, symbol in enumerate(variables)}
+    def __init__(self, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> None:
+        super().__init__({"order": "none", "fold_func_brackets": True})
+        self.rank = {symbol: place for place, symbol in enumerate([*variables, *noises])}
         self.noises = set(noises)
 
-    def arranged(self, expression: sp.Expr) -> sp.Expr:
-        if isinstance(expression, sp.Add):
-            return sp.Add(*map(self.arranged, self.terms(expression)), evaluate=False)
-        if isinstance(expression, sp.Mul):
-            return sp.Mul(
-                *map(self.arranged, sorted(expression.args, key=self.factor_key)), evaluate=False
-            )
-        if isinstance(expression, sp.Pow) and not expression.base.is_Atom:
-            return sp.Pow(self.arranged(expression.base), expression.exp, evaluate=False)
-        if isinstance(expression, sp.Function):
-            return expression.func(*map(self.arranged, expression.args), evaluate=False)
-        return expression
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
+        return self.terms(expr)
+
+    def _print_Mul(self, expr: sp.Mul) -> str:
+        factors = sorted(expr.args, key=self.factor_key)
+        return super()._print_Mul(sp.Mul(*factors, evaluate=False))
 
     def factor_key(self, factor: sp.Expr) -> tuple[bool, bool, int, str]:
         ranks = [self.rank[symbol] for symbol in factor.free_symbols if symbol in self.rank]

@@ -129,6 +129,7 @@ def test_benes_filter_and_the_order_of_a_sub_step():
         assert then < 2 * first * (few / many) ** 2
 
 
+@pytest.mark.slow
 def test_the_bound_of_a_comparison():
     model = sampled("-0.5*x - 0.1*x**3", "1.5", "x + 0.5*x**2 + w")
     filters = [pointmass(model), aof(gaussian(model)), aof(linearised(model))]

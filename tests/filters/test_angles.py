@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from kfcourse.angles import difference, moments_on_circle, wrapped
@@ -217,9 +218,9 @@ def test_a_phase_is_filtered_on_the_circle_as_on_the_line():
         and np.abs(around_x[..., 0]).max() <= PI
         and np.abs(around_y).max() <= PI
     )
-    np.testing.assert_allclose(wrapped(x - around_x)[..., 0], 0, atol=1e-12)  # rounding of 40 steps
-    np.testing.assert_allclose(wrapped(y - around_y), 0, atol=1e-12)
-    np.testing.assert_allclose(x[..., 1], around_x[..., 1], rtol=1e-12)
+    assert_allclose(wrapped(x - around_x)[..., 0], 0, atol=1e-12)  # rounding of 40 steps
+    assert_allclose(wrapped(y - around_y), 0, atol=1e-12)
+    assert_allclose(x[..., 1], around_x[..., 1], rtol=1e-12)
     expected = run(kalman_filter(line), y)
     structures = [linearised(circle), gaussian(circle), unscented(circle), gauss_hermite(circle, 3)]
     filters = [kalman_filter(circle), *(aof(s) for s in structures), iterated(structures[0], 3)]
@@ -228,9 +229,9 @@ def test_a_phase_is_filtered_on_the_circle_as_on_the_line():
         law, name = run(filter_, around_y), filter_.name
         assert np.abs(law.mean[..., 0]).max() <= PI
         off = difference(law.mean, expected.mean, (0,))
-        np.testing.assert_allclose(off, 0, atol=1e-9, err_msg=name)
+        assert_allclose(off, 0, atol=1e-9, err_msg=name)
         # some zeros are sums
-        np.testing.assert_allclose(law.cov, expected.cov, rtol=1e-9, atol=1e-15, err_msg=name)
+        assert_allclose(law.cov, expected.cov, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
 def test_errors_of_a_comparison_go_the_short_way():
@@ -247,7 +248,7 @@ def test_errors_of_a_comparison_go_the_short_way():
         compare(filters(m), m, 2000, 30, seed=4, jobs=1, same_ensemble=True)
         for m in (phase([]), phase(["psi", "y"]))
     )
-    np.testing.assert_allclose(
+    assert_allclose(
         circle.error_variance("kalman").value, line.error_variance("kalman").value, rtol=1e-9
     )
     for name in circle.names:
@@ -263,7 +264,7 @@ def test_what_a_filter_remembers_of_a_measured_angle_is_its_innovation():
     )
     (filter_,) = design([fos(linearised(model), 3)], Ensemble(model, 100, 1, seed=1))
     kept = filter_.step(filter_.init(3), np.array([[3.0], [-3.1], [np.nan]])).memory.measurements
-    np.testing.assert_allclose(kept[0].ravel(), [-0.1, 2 * PI - 6.2, 0], atol=1e-12)
+    assert_allclose(kept[0].ravel(), [-0.1, 2 * PI - 6.2, 0], atol=1e-12)
 
 
 def test_angles_are_kept_together_where_estimates_are_remembered():
@@ -271,7 +272,7 @@ def test_angles_are_kept_together_where_estimates_are_remembered():
     is estimated now."""
     before = Remembered((np.array([[3.1, 2.0]]),))
     kept = before.and_now(np.array([[-3.1, 2.1]]), np.empty((1, 0)), Memory(2), turning=(0,))
-    np.testing.assert_allclose(kept.regressor, [[-3.1, 2.1, 3.1 - 2 * PI, 2.0]])
+    assert_allclose(kept.regressor, [[-3.1, 2.1, 3.1 - 2 * PI, 2.0]])
 
 
 # ---------------------------------------------------------------- densities on the circle
@@ -285,7 +286,7 @@ def test_the_likelihood_of_a_measured_angle_is_wound_around_the_circle():
     angle = norm.pdf(3.0 - x[:, :1] + turns, scale=2.0).sum(axis=1)
     for y, other in ((2.5, norm.pdf(2.5 - x[:, 1])), (np.nan, 1.0)):
         density = likelihood(model)(np.array([3.0, y]), x)
-        np.testing.assert_allclose(density, np.log(angle * other), rtol=1e-12)
+        assert_allclose(density, np.log(angle * other), rtol=1e-12)
 
 
 def by_grid(meter_sd, prior, y):

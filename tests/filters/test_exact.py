@@ -142,14 +142,11 @@ MIDPOINTS = evenly(-39.99, 40, 0.02), 1e-4, (1e-3,)
 IN_PROPORTION = graded(0, least=1e-2, most=12, count=3000), FLOOR, (ACCURACY,)
 DISPLACED = {"mean": 0.5, "variance": 2.0}
 ON_POINTS = {
-    "5": FINE,
-    "7": FINE,
     "11": FINE,
     "53": IN_PROPORTION,
     ("0.95*x + 0.3*v", "exp(x/2)*w"): FINE,  # stochastic volatility
     ("0.45*(x - 1 + Abs(x + 1)) + 0.4*v", "x + 0.5*w"): MIDPOINTS,
     ("x - 0.5*sign(x) + v", "x + w"): MIDPOINTS,  # dry friction
-    ("Heaviside(x) + v", "x + w"): MIDPOINTS,
     ("0.9*x + (1 if x < 0 else 2)*v", "x + w"): MIDPOINTS,
     ("0.9*x + v", "2*sign(x) + w"): MIDPOINTS,
 }

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 import sympy as sp
+from numpy.testing import assert_allclose, assert_array_equal
 from test_every_filter import OF_MEASUREMENTS, STRUCTURES
 
 from kfcourse.filters import EQUATIONS
@@ -153,8 +154,7 @@ FAMILIES = {
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("size", PRINTED)
-@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
+@pytest.mark.parametrize(("size", "kind"), [("p=1", "gaussian"), ("p=2", "linearised")])
 def test_the_printed_equations_are_what_runs(family, size, kind):
     model = PRINTED[size]()
     structure = STRUCTURES[kind](model)
@@ -189,12 +189,12 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
         # Printed: plain inverses and differences; run: solutions and Joseph's form. 15
         # trajectories, conditions up to 1e4.
         tolerance = {"rtol": 1e-8, "atol": 1e-9}
-        np.testing.assert_allclose(state.posterior.mean, printed[s.z][..., 0], **tolerance)
-        np.testing.assert_allclose(state.predicted.mean, printed[s.lam_next][..., 0], **tolerance)
+        assert_allclose(state.posterior.mean, printed[s.z][..., 0], **tolerance)
+        assert_allclose(state.predicted.mean, printed[s.lam_next][..., 0], **tolerance)
         if s.P in printed:
-            np.testing.assert_allclose(state.posterior.cov, printed[s.P], **tolerance)
+            assert_allclose(state.posterior.cov, printed[s.P], **tolerance)
         if s.Psi_next in printed:
-            np.testing.assert_allclose(
+            assert_allclose(
                 np.broadcast_to(state.predicted.cov, (runs, 2, 2)), printed[s.Psi_next], **tolerance
             )
             Psi = printed[s.Psi_next]
@@ -218,4 +218,4 @@ def test_a_longer_memory_holds_no_more_than_there_is():
     y = simulate(model, 5, 4, seed=4).y
     plans = [fkp(linearised(model), size) for size in (4, 40)]
     short, long = (run(filter_, y).mean for filter_ in design(plans, Ensemble(model, 300, 4, 3)))
-    np.testing.assert_array_equal(short, long)
+    assert_array_equal(short, long)

@@ -3,6 +3,7 @@ found again."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chi2
 from test_every_filter import READY
 
@@ -83,12 +84,12 @@ def test_in_every_filter_what_is_refused_is_missing():
     expected[2, 0] = expected[4:6, 1] = True
     for filter_ in every_filter():
         guarded = gated(filter_, structure=linearised(walk()))
-        np.testing.assert_array_equal(refused(guarded, y), expected, err_msg=filter_.name)
-        np.testing.assert_array_equal(np.isnan(weights(guarded, y)), np.isnan(y[..., 0]))
+        assert_array_equal(refused(guarded, y), expected, err_msg=filter_.name)
+        assert_array_equal(np.isnan(weights(guarded, y)), np.isnan(y[..., 0]))
         law = run(guarded, y)
         behind = run(filter_, np.where(expected[..., None], np.nan, y))
-        np.testing.assert_array_equal(law.mean, behind.mean, err_msg=filter_.name)
-        np.testing.assert_array_equal(law.cov, behind.cov, err_msg=filter_.name)
+        assert_array_equal(law.mean, behind.mean, err_msg=filter_.name)
+        assert_array_equal(law.cov, behind.cov, err_msg=filter_.name)
 
 
 @pytest.mark.parametrize("probability", [0.9, 0.99])
@@ -116,9 +117,7 @@ def test_an_innovation_of_a_turn_is_none():
         prior={"mean": 3.1, "variance": 0.01},
     )
     y = np.array([3.1, -3.1, 3.12, 1.0, -3.13])
-    np.testing.assert_array_equal(
-        weights(gated(aof(linearised(model))), y).ravel(), [1, 1, 1, 0, 1]
-    )
+    assert_array_equal(weights(gated(aof(linearised(model))), y).ravel(), [1, 1, 1, 0, 1])
 
 
 # ---------------------------------------------------------------- the lost track
@@ -165,7 +164,7 @@ def test_gaps_neither_feed_nor_calm_impatience_and_the_next_passes_whatever_it_i
     model = Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})
     y = np.array([0.0, 50.0, GAP, GAP, 51.0, GAP, -4000.0, 0.0])
     weight = weights(gated(kalman_filter(model), patience=patience), y)
-    np.testing.assert_array_equal(weight.ravel(), expected)
+    assert_array_equal(weight.ravel(), expected)
 
 
 # ---------------------------------------------------------------- what is refused
@@ -194,8 +193,8 @@ def test_components_are_judged_each_for_itself_on_request(plane):
     behind = gated(plain, 0.999, by_component=True)
     seen = y.copy()
     seen[2, 0] = seen[4, 1] = seen[5, 1, 0] = np.nan
-    np.testing.assert_allclose(run(behind, y).mean, run(plain, seen).mean, rtol=1e-12)
-    np.testing.assert_array_equal(weights(behind, y)[5], [1, 0.5, 1])
+    assert_allclose(run(behind, y).mean, run(plain, seen).mean, rtol=1e-12)
+    assert_array_equal(weights(behind, y)[5], [1, 0.5, 1])
     assert weights(gated(plain, 0.999), y)[5, 1] == 0  # the whole row
     edge = chi2(1).ppf(0.999)
     _, F = innovations(structure.measure, predictions(behind, y), y)

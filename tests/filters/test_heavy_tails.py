@@ -41,7 +41,7 @@ def test_it_settles_where_weight_and_law_agree(plane, rows, weigh, parameter, op
     H = np.array([[1.0, 0.0], [0.2, 1.0]])[rows]
     R, y = NOISE[np.ix_(rows, rows)], np.full((1, 4, 2), np.nan)
     y[0][:, rows] = np.array([[0.9, -0.2], [3.0, 2.0], [-6.0, 1.0], [40.0, -90.0]])[:, rows]
-    filter_ = robust(linearised(plane), rounds=400, **options)
+    filter_ = robust(linearised(plane), rounds=150, **options)
     law, w = run(filter_, y), weights(filter_, y)[0]
     for i in range(4):
         p = np.linalg.inv(np.linalg.inv(PRIOR_COV) + w[i] * H.T @ np.linalg.solve(R, H))

@@ -2,7 +2,6 @@
 is linear in the noise."""
 
 import numpy as np
-import pytest
 from scipy import stats
 
 from kfcourse import Model, run, simulate
@@ -10,19 +9,13 @@ from kfcourse.filters import pointmass
 from kfcourse.filters.densities import likelihood
 
 
-@pytest.mark.parametrize(
-    ("meter", "linear", "back"),
-    [
-        ("sinh(x + 0.3*w)", "x + 0.3*w", np.arcsinh),
-        ("(2 + tanh(x))*exp(0.3*w)", "log(2 + tanh(x)) + 0.3*w", np.log),
-    ],
-)
-def test_it_is_the_filter_of_the_transformed_measurement(meter, linear, back):
+def test_it_is_the_filter_of_the_transformed_measurement():
     """Bayes' rule does not know in which units y is written: the factor |d omega/dy| is the same
     for all states."""
-    curved, straight = (Model.define("0.9*x + 0.4*v", text) for text in (meter, linear))
+    meters = "(2 + tanh(x))*exp(0.3*w)", "log(2 + tanh(x)) + 0.3*w"
+    curved, straight = (Model.define("0.9*x + 0.4*v", meter) for meter in meters)
     _, y = simulate(curved, 10, 5, seed=1)
-    law, expected = run(pointmass(curved), y), run(pointmass(straight), back(y))
+    law, expected = run(pointmass(curved), y), run(pointmass(straight), np.log(y))
     sigma = np.sqrt(expected.cov[..., 0, 0])
     # twice the accuracy of a step
     assert (np.abs(law.mean - expected.mean)[..., 0] < 2e-6 * sigma).all()

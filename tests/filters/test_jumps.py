@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_normal, norm
 from test_every_filter import LINEAR, exact_ensemble
 from test_multiple_models import follow
@@ -96,7 +97,7 @@ def test_the_exact_filter_is_the_sum_over_all_histories(model):
             # the accuracy of a step is 1e-3 standard deviations, and estimated with caution
             assert abs(mean[k, trajectory] - z) < 1e-3 * np.sqrt(variance)
             assert abs(cov[k, trajectory] / variance - 1) < 2e-3
-            np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-3)
+            assert_allclose(probability[k, trajectory], expected, atol=1e-3)
         assert abs(total[trajectory] - evidence) < 6e-3
 
 
@@ -110,8 +111,8 @@ def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
     y = simulate(model, 5, 20, seed=4).y
     y[3, 0] = np.nan
     ours, expected = run(build([kind(model)], [[1.0]]), y), run(aof(kind(model)), y)
-    np.testing.assert_array_equal(ours.mean, expected.mean)
-    np.testing.assert_array_equal(ours.cov, expected.cov)
+    assert_array_equal(ours.mean, expected.mean)
+    assert_array_equal(ours.cov, expected.cov)
 
 
 def test_what_is_merged_when():
@@ -127,7 +128,7 @@ def test_what_is_merged_when():
                 assert same == (k < exact)
                 if k < exact:
                     assert abs(cov[k, trajectory] / variance - 1) < 1e-9
-                    np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-9)
+                    assert_allclose(probability[k, trajectory], expected, atol=1e-9)
 
 
 def test_a_mode_that_no_measurement_believes_does_not_take_the_filter_away():
@@ -139,7 +140,7 @@ def test_a_mode_that_no_measurement_believes_does_not_take_the_filter_away():
     doubt of the mode, both estimate the same.
     """
     model = find_variant("J3").model
-    y = simulate(model, 300, 25, seed=1).y
+    y = simulate(model, 100, 25, seed=1).y
     both = [run(of(build, model, linearised), y) for build in (gpb2, logic_dynamic)]
     assert all(np.isfinite(part).all() for law in both for part in law)
     spread = np.sqrt(np.diagonal(both[1].cov, axis1=-2, axis2=-1))
@@ -153,9 +154,7 @@ def test_a_chain_that_changes_with_time():
     assert (y.mode == (np.arange(10) >= 5)[:, None]).all()
     for filter_ in (of(logic_dynamic, model), of(gpb2, model), pointmass(model)):
         probability = follow(filter_, y.y)[2]
-        np.testing.assert_allclose(
-            probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12
-        )
+        assert_allclose(probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12)
 
 
 # --- the FOS with modes
@@ -188,7 +187,7 @@ def test_without_jumps_a_linear_model_has_its_kalman_filter(family, modes):
     (filter_,) = design([build(model, [gaussian(plain)] * modes)], moments)
     y = simulate(plain, 4, steps, seed=8).y
     for ours, expected in zip(run(filter_, y), run(kalman_filter(plain), y), strict=True):
-        np.testing.assert_allclose(ours, expected, rtol=1e-8, atol=1e-8)
+        assert_allclose(ours, expected, rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize("family", REMEMBERING)
@@ -211,10 +210,10 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
         expected = np.full(1 + bool(measurements), (c.T * m).sum(axis=0)[7])
         memory = gap.memory.kept.measurements[:1]
         holes = [gap.posterior.mean[7, 0], *(row[7, 0] for row in memory)]
-        np.testing.assert_allclose(holes, expected, rtol=1e-7)
+        assert_allclose(holes, expected, rtol=1e-7)
         state = filter_.step(state, block.y)
-        np.testing.assert_allclose(state.posterior.mean[:, 0], z, rtol=1e-7)
-        np.testing.assert_allclose(state.memory.probability, mu.T, rtol=1e-6, atol=1e-9)
+        assert_allclose(state.posterior.mean[:, 0], z, rtol=1e-7)
+        assert_allclose(state.memory.probability, mu.T, rtol=1e-6, atol=1e-9)
         ys, zs = [y, *ys], [z, *zs]
         zeta = np.stack(ys[:measurements] + zs[:estimates])
         u, T, xi = np.empty((2, runs)), np.empty(2), np.empty((2, runs))
@@ -300,5 +299,5 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
         oracles.is_mean(first.item(), sample)
         oracles.is_mean(second.item(), away**2)
         oracles.is_mean(0.5 * slope.item(), (x[:, 0] - 0.7) * away)
-    np.testing.assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
-    np.testing.assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)
+    assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
+    assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)

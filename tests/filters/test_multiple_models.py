@@ -3,6 +3,7 @@
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_normal
 
 from kfcourse import JumpModel, Model, linearised, run, simulate
@@ -76,7 +77,7 @@ def test_against_a_slow_loop():
     for trajectory in range(y.shape[1]):
         expected = slow_imm(y[:, trajectory], systems, PI, START, MODELS[0].prior)
         for ours, wanted in zip(columns, zip(*expected, strict=True), strict=True):
-            np.testing.assert_allclose(ours[:, trajectory], wanted, rtol=0, atol=ROUNDING)
+            assert_allclose(ours[:, trajectory], wanted, rtol=0, atol=ROUNDING)
 
 
 # --- bad input
@@ -123,10 +124,8 @@ def test_a_model_that_jumps_gives_the_first_probabilities_too(build):
         first=[1, 0],
     )
     structures = [linearised(mode) for mode in jump.modes]
-    np.testing.assert_array_equal(build(structures, jump).init(2).memory.probability, [[1, 0]] * 2)
-    np.testing.assert_array_equal(
-        build(structures, jump.transition_at).init(2).memory.probability, 0.5
-    )
+    assert_array_equal(build(structures, jump).init(2).memory.probability, [[1, 0]] * 2)
+    assert_array_equal(build(structures, jump.transition_at).init(2).memory.probability, 0.5)
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import oracles
 import pytest
-import sympy as sp
+from numpy.testing import assert_allclose
 from test_every_filter import LINEAR
 
 from kfcourse.filters import (
@@ -39,7 +39,7 @@ U = list(oracles.Changing.U)
 # change
 
 
-@pytest.mark.parametrize("name", ["changing", "scalar", "n=2, p=2, more noises", "n=1, p=2"])
+@pytest.mark.parametrize("name", ["changing", "scalar, more noises", "n=3, p=2", "n=1, p=2"])
 def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each_step(name):
     system = LINEAR[name]
     y = simulate(system.model(), 4, STEPS, seed=3).y
@@ -48,7 +48,7 @@ def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each
         loop = oracles.kalman_loop(oracles.steps_of(system, STEPS), system.laws["prior"], y[:, i])
         for k, (_, expected) in enumerate(loop):
             for ours, wanted in zip(law, expected, strict=True):
-                np.testing.assert_allclose(ours[k, i], wanted, rtol=1e-9, atol=1e-9)
+                assert_allclose(ours[k, i], wanted, rtol=1e-9, atol=1e-9)
 
 
 def test_trajectories_satisfy_the_equations_of_each_step():
@@ -88,7 +88,7 @@ def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
         (slope,), offset, _ = oracles.regression(x[k] - lam, omega)
         z = lam + slope * omega + offset
         # 50 trajectories, regressions conditioned up to 1e3
-        np.testing.assert_allclose(mean[k], z, rtol=1e-9, atol=1e-11)
+        assert_allclose(mean[k], z, rtol=1e-9, atol=1e-11)
         alpha = 0.5 * z + 3 * np.sin(z + 0.9 * k)
         (slope,), offset, _ = oracles.regression(x[k + 1], alpha)
         lam = slope * alpha + offset
@@ -122,7 +122,7 @@ def value_at(formula, k, **options):
 )
 def test_formulas_of_the_step(formula, values):
     ours = [value_at(formula, k, inputs={"u": U}, interval=15) for k in range(4)]
-    np.testing.assert_allclose(ours, values, rtol=1e-14, atol=1e-14)
+    assert_allclose(ours, values, rtol=1e-14, atol=1e-14)
 
 
 def jumping(k):
@@ -156,7 +156,7 @@ def test_what_jumps_with_the_step_is_a_constant_for_the_structural_functions(bui
             (*then.predict(*law)[parts], *then.measure(*law)[parts]),
             strict=True,
         ):
-            np.testing.assert_allclose(*np.broadcast_arrays(ours, expected), rtol=1e-11, atol=1e-13)
+            assert_allclose(*np.broadcast_arrays(ours, expected), rtol=1e-11, atol=1e-13)
 
 
 @pytest.mark.parametrize("build", [linearised, gaussian, unscented])
@@ -178,7 +178,7 @@ def test_noise_laws_that_change_with_time_are_factors_in_the_equations(build):
     )
     y = simulate(by_law, 4, 7, seed=9).y
     for ours, expected in zip(run(aof(build(by_law)), y), run(aof(build(by_hand)), y), strict=True):
-        np.testing.assert_allclose(ours, expected, rtol=1e-12)
+        assert_allclose(ours, expected, rtol=1e-12)
 
 
 def test_k_and_t_mean_what_else_they_name():
@@ -190,15 +190,9 @@ def test_k_and_t_mean_what_else_they_name():
 
 def test_what_is_printed_names_the_step():
     model = Model.define("x + u*v + t", "x + w", inputs={"u": U}, interval=0.5)
-    assert repr(model).endswith("inputs u (10 values))")
-    text = model.latex()
-    assert (
-        r"t &= \frac{k}{2}" in text
-        and r"u_0, u_1, \ldots &= 0.7, -2, 3, 0, 1.5, -1, \ldots" in text
-    )
+    listed = r"t &= \frac{k}{2}", r"u_0, u_1, \ldots &= 0.7, -2, 3, 0, 1.5, -1, \ldots"
+    assert all(line in model.latex() for line in listed)
     assert r"\tau(z, p, k) &= " in linearised(model).latex()
-    x, k, u = sp.Symbol("z", real=True), sp.Symbol("t", real=True), sp.Symbol("u", real=True)
-    assert linearised(model)["tau"] == x + k and linearised(model)["Theta"].coeff(u, 2) == 1
 
 
 @pytest.mark.parametrize(
@@ -218,7 +212,7 @@ def test_what_is_printed_names_the_step():
         ("(1 if sin(k) + (k < 2) else 2)", "Compare is not allowed|a condition compares"),
         ("(k < 2)", "Compare is not allowed"),
         ("(1 if k in (1, 2) else 2)", "a condition compares"),
-        ("Heaviside(k, 1)", "takes exactly one argument"),
+        ("Heaviside(k, 1)", "takes 1 argument"),
     ],
 )
 def test_what_does_not_fit_is_refused(options, message):
@@ -264,36 +258,19 @@ def test_functions_of_a_model_with_time_want_the_step():
 # ---------------------------------------------------------------- kinks and jumps of the state
 
 
-def with_meter(formula):
-    return Model.define("0.9*x + 0.3*v", f"{formula} + 0.5*w", prior={"mean": 0.4})
-
-
 SMOOTH_ENOUGH = {
     "Abs(x)": -1.0,
     "(x if x < 1 else 1)": 1.0,
     "(x if x < 1 else 2*x - 1)": 1.0,
     "x*Abs(x)": 1.4,
 }
-JUMPS = [
-    "sign(x)",
-    "Heaviside(x - 1)",
-    "(x if x < 1 else 2)",
-    "(x if x < 1 else x**2 if x < 2 else 1)",
-]
 
 
 @pytest.mark.parametrize(("formula", "slope"), SMOOTH_ENOUGH.items())
 def test_a_kink_can_be_linearised(formula, slope):
-    at = -0.5 if slope == -1 else 0.7
-    measurement = linearised(with_meter(formula)).measure(np.array([[at]]), np.ones((1, 1, 1)))
-    assert measurement.G.item() == pytest.approx(slope)
-
-
-@pytest.mark.parametrize("formula", JUMPS)
-def test_a_jump_is_refused_with_the_reason_where_it_cannot_be_used(formula):
-    model = with_meter(formula)
-    with pytest.raises(NoClosedForm, match="not differentiable and cannot be linearised"):
-        linearised(model)
+    at = np.array([[-0.5 if slope == -1 else 0.7]])
+    structure = linearised(Model.define("0.9*x + 0.3*v", f"{formula} + 0.5*w"))
+    assert structure.measure(at, np.ones((1, 1, 1))).G.item() == pytest.approx(slope)
 
 
 @pytest.mark.parametrize(
@@ -320,8 +297,8 @@ def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
     else:
         with pytest.raises(ModelError):
             pointmass(model)
-    x, y = simulate(model, 200_000, 2, seed=1)
-    # the error of a rule at a jump is the weight of a point, 0.05 at most here
+    x, y = simulate(model, 20_000, 2, seed=1)
+    # the error of a rule at a jump is the weight of a point, 0.05 at most here; of the sample, 0.05
     structure = gauss_hermite(model, 60)
     tau, theta = structure.predict(*model.prior)
     h, _, F, _ = structure.measure(*model.prior)

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 
 from kfcourse import Model, cli, linearised, run, smooth
 from kfcourse.filters import aof, gated
@@ -109,6 +110,19 @@ def test_the_practitioner_s_track(place):
     one = gated(aof(linearised(record.model)), 0.999)
     np.testing.assert_array_equal(behind.estimate.mean, run(one, record.y).mean)
     np.testing.assert_array_equal(behind.smoothed.mean, smooth(one, record.y).mean)
+
+
+def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
+    ax = Figure().add_subplot()
+    for size in (5000, 5001):
+        own_data._curve(ax, np.arange(size), np.zeros(size), color="k")
+    assert [line.get_rasterized() for line in ax.lines] == [False, True]
+    times, _, y = practitioner_s_track(2)
+    written(place / "track.csv", times, y)
+    told = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"))
+    passed = told.examined.passed[:, 0, 0]
+    own_data._whiteness(own_data.columns_of(told), "y1", passed, ax)
+    assert len(ax.lines[3].get_xdata()) == 20
 
 
 def test_the_command_writes_numbers_and_a_report(call, place):

@@ -11,21 +11,25 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import Model, cli, load_variants
-from kfcourse.checks.posing import unposed
+from kfcourse.exercises.checks.posing import unposed
 from kfcourse.lab import grammar, quality
 from kfcourse.lab.grammar import PIECES, generate, propose
 from kfcourse.lab.quality import (
-    CARRIERS,
     Finding,
     Quality,
     bounded,
     examine,
     examine_all,
+    not_diverging,
+    solvable,
     table,
 )
+from kfcourse.lab.short_names import Structures
 from kfcourse.lab.variants import STEPS, read_variant
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo import FEWEST
+from kfcourse.montecarlo import BATCHES, FEWEST
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.statistics import Sums
 
 SHIPPED = load_variants()
 
@@ -131,13 +135,21 @@ def test_a_bad_variant_is_refused_for_its_reason(case):
         assert "filters differ" not in found.findings
 
 
-def test_long_formulas_are_refused(monkeypatch):
-    monkeypatch.setattr("kfcourse.lab.quality.LONGEST", 20)
-    found = examine(SHIPPED["53"], FEWEST)
-    assert (
-        found.faults["solvable"]
-        == "closed form, 28 operations in the Gaussian structural functions, more than 20"
-    )
+def test_long_formulas_are_refused():
+    for power, says in ((9, "557 operations"), (10, "693 operations")):
+        model = Model.define("0.9*x + v", f"(1 + x)**{power} + w")
+        found = solvable(Structures(model))
+        assert says in found.says and found.ok == ("more than 600" not in found.says)
+        assert found.ok == (power == 9)
+
+
+def test_a_filter_diverges_at_ten_times_the_variance_of_the_state():
+    x = np.random.default_rng(1).normal(size=(1, BATCHES, 1))
+    for times, diverges in ((8, False), (12, True)):
+        sums = Sums.empty(1, 1, 1, BATCHES)
+        sums.weight[:], sums.square[:] = 1, times * x.var()
+        result = Comparison(SHIPPED["53"].model, ("duof",), BATCHES, 1, 1, sums)
+        assert bool(not_diverging(result, x)) == diverges
 
 
 def test_a_derivation_without_end_is_given_up(monkeypatch):
@@ -159,25 +171,24 @@ def test_a_variant_whose_questions_cannot_be_posed_is_named_with_the_question():
 
 
 def test_growth_is_that_of_the_second_moment():
-    x = 1.1 ** np.arange(51)[:, None, None] * np.random.default_rng(1).choice(
-        [-1.0, 1.0], (51, 400, 1)
-    )
-    # maxima at the steps 50 and 25
-    assert bounded(x).value == pytest.approx(1.1 ** (2 * 25), rel=1e-12)
-    assert not bounded(x).ok
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], (51, 400, 1))
+    for growth in (8.0, 12.0):
+        # maxima at the steps 50 and 25
+        x = growth ** (np.arange(51)[:, None, None] / 50) * signs
+        assert bounded(x).value == pytest.approx(growth, rel=1e-12)
+        assert bounded(x).ok == (growth < 10)
     assert bounded(x[::-1]).ok
     assert bounded(x[:1]).ok  # one step does not grow
     # the worst component
-    assert bounded(np.concatenate([x[::-1], x], axis=2)).value == pytest.approx(1.1**50, rel=1e-12)
+    assert bounded(np.concatenate([x[::-1], x], axis=2)).value == pytest.approx(12, rel=1e-12)
 
 
 def test_a_moment_of_a_few_trajectories_is_refused():
-    few = int(CARRIERS)
     x = np.zeros((4, 1000, 1))
-    x[:, : few - 1] = 1.0  # (sum u^2)^2 / sum u^4 is nearly their number
+    x[:, :9] = 1.0  # (sum u^2)^2 / sum u^4 is nearly their number
     x[:, 0] = -1.0
     assert not bounded(x).ok
-    x[:, : few + 2] = 1.0
+    x[:, :12] = 1.0
     assert bounded(x).ok
 
 
@@ -366,9 +377,7 @@ def test_a_search_without_end_is_given_up_and_formulas_are_seldom_repeated(judge
     )
     monkeypatch.setattr(grammar, "read_variant", lambda name, *_: name)
     found = generate(4, jobs=1)
-    assert found.variants == ["g1"] and found.rejected == {
-        "formulas of another one": 4 * grammar.PATIENCE - 1
-    }
+    assert found.variants == ["g1"] and found.rejected == {"formulas of another one": 4 * 20 - 1}
     assert len(generate(150, jobs=1).variants) == 4
 
 

@@ -281,6 +281,7 @@ def test_the_report_of_variant_53(written, language):
     ):
         assert formula in tex, formula
     assert (r"\usepackage[english,russian]{babel}" in tex) == (language == "ru")
+    assert tex.count(r"\begin{tabular}{lllll}") == 2  # the steps, and four of the eight filters
     assert tex.count(r"\begin{") == tex.count(r"\end{")
     assert not re.search(r"(?<!\\)%", tex), "an unescaped per cent sign hides the rest of its line"
     page = page_of(written["53", language])
@@ -332,6 +333,12 @@ def test_what_is_written_out_is_the_filter_that_runs(name, kind):
         # rounding of some dozens of operations, in another order
         assert now["z_{k}"] == pytest.approx(expected.mean[k].item(), rel=1e-9, abs=1e-12)
         assert now["p_{k}"] == pytest.approx(expected.cov[k].item(), rel=1e-9)
+
+
+def test_short_functions_have_no_lines_of_their_own():
+    """Of variant 3 h and G have 10 to 20 symbols, and are put into K and z."""
+    names = [symbol.name for symbol, _ in scalar_equations(gaussian(VARIANTS["3"].model))]
+    assert names == ["F_{k}", "K_{k}", "z_{k}", "p_{k}", r"\lambda_{k+1}", r"\Psi_{k+1}"]
 
 
 def test_a_vector_variant_has_no_scalar_derivation(written):

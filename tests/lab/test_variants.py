@@ -6,9 +6,9 @@ import tomllib
 import pytest
 
 from kfcourse import Model, ModelError, NoClosedForm, gaussian, lab_filters, load_variants
-from kfcourse.checks import exercise
-from kfcourse.checks.exercises import ExerciseError
-from kfcourse.checks.posing import unposed
+from kfcourse.exercises.checks import exercise
+from kfcourse.exercises.checks.exercises import ExerciseError
+from kfcourse.exercises.checks.posing import unposed
 from kfcourse.filters import Design, Filter
 from kfcourse.lab import variants as of_variants
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
@@ -32,7 +32,7 @@ GOOD = 'state = "0.9*x + v"\nmeter = "x + w"\n'
 def test_the_shipped_variants():
     """Names, titles and structural functions of their own; scalar ones have the exact filter."""
     assert len(SHIPPED) >= 12
-    assert str(SHIPPED["53"].model.state_equation[0]) == "c*x + e*v*x"
+    assert str(SHIPPED["53"].model.state_equation[0]) == "c*x + e*v*x" and SHIPPED["53"].steps == 51
     assert all(variant.name == name for name, variant in SHIPPED.items())
     titles = {variant.title for variant in SHIPPED.values()}
     printed = {gaussian(variant.model).latex() for variant in SHIPPED.values()}
@@ -72,7 +72,8 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
         lab_filters(model, ["duof", "fos-gaussian"])
     with pytest.raises(ModelError, match=r"^aof-exact: .*noise enters nonlinearly"):
         lab_filters(Model.define("0.9*x + v", "x + w**2"), ["aof-exact"])
-    assert lab_filters(SHIPPED["20"].model, ["aof-exact"])[0].name == "aof-exact"
+    (bound,) = lab_filters(SHIPPED["20"].model, ["aof-exact"])
+    assert bound.name == "aof-exact" and bound.init(1).memory.effective == 1000  # particles
     assert (
         len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"]))
         == 4
@@ -150,27 +151,6 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
     with pytest.warns(VariantWarning, match=r"^variant bad in") as warned:
         assert list(load_variants(path)) == ["good"]
     assert [str(one.message) for one in warned] == [message]
-
-
-@pytest.mark.parametrize(
-    "formula",
-    [
-        "__import__('os').system('touch {marker}')",
-        "open('{marker}', 'w')",
-        "(lambda: open('{marker}', 'w'))()",
-        "x + ().__class__.__base__.__subclasses__()[0]",
-        "f'{{open(1)}}'",
-    ],
-)
-def test_a_formula_cannot_execute_code(tmp_path, formula):
-    marker, path = tmp_path / "marker", tmp_path / "mine.toml"
-    path.write_text(
-        f'[variants.bad]\nstate = "{formula.format(marker=marker)}"\nmeter = "x + w"\n',
-        encoding="utf-8",
-    )
-    with pytest.raises(VariantError, match=r"variant bad in .*mine\.toml"):
-        load_variants(path)
-    assert not marker.exists()
 
 
 @pytest.mark.parametrize(

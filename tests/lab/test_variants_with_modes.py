@@ -11,7 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import JumpModel, cli, load_variants, simulate
-from kfcourse.filters import logic_dynamic, pointmass
+from kfcourse.exercises.notebooks import handing_out
+from kfcourse.exercises.notebooks.jobs import Outcome
+from kfcourse.filters import logic_dynamic, particle, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, Structures, title
 from kfcourse.lab.variants import (
@@ -22,8 +24,6 @@ from kfcourse.lab.variants import (
     summary,
 )
 from kfcourse.montecarlo.modes import recognised
-from kfcourse.notebooks import handing_out
-from kfcourse.notebooks.jobs import Outcome
 
 JUMPS = {name: one for name, one in read_variants()[0].items() if isinstance(one.model, JumpModel)}
 OWN = """
@@ -190,7 +190,7 @@ def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
 def test_the_share_of_right_modes_is_that_of_the_trajectories():
     model = JUMPS["J1-lasting"].model
     one = logic_dynamic(Structures(model).gaussian, model.transition_at, model.first)
-    found = recognised([one, pointmass(model)], model, 160, 8, 4)
+    found = recognised([one, pointmass(model), particle(model, 10)], model, 160, 8, 4)
     _, y, mode = simulate(model, 160, 8, 4)
     state, right = one.init(160), []
     for k in range(8):
@@ -201,10 +201,14 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
     shown = next(k for k in range(20) if 0 < mode[:, k].mean() < 1)  # the first with both modes
     np.testing.assert_array_equal(found.mode, mode[:, shown])
     assert found.probability[one.name].shape == (8, 2)
+    # particles are slow
+    assert [one.freedom + 1 for one in found.share.values()] == [160, 160, 20]
 
 
 def test_the_chapter_shows_the_shipped_table():
-    page = (Path(__file__).parents[2] / "book" / "models-that-jump.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "book" / "beyond/models-that-jump.md").read_text(
+        encoding="utf-8"
+    )
     (block,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     (name, shown), *_ = tomllib.loads(block)["variants"].items()
     assert shown == {key: value for key, value in JUMPS[name].table.items() if key != "title"}

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.stats
+from numpy.testing import assert_allclose
 
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.laws import Gaussian, normalised_square
@@ -47,7 +48,7 @@ def paths():
     return simulate(tracking(), RUNS, STEPS, seed=5)
 
 
-def found(model, y) -> Innovations:
+def innovations_of(model, y) -> Innovations:
     return innovations(linearised(model).measure, predictions(kalman_filter(model), y), y)
 
 
@@ -63,31 +64,29 @@ def test_the_normalised_square_is_the_loop_of_the_page():
         for row in zip(vector, cov, strict=True)
     ]
     # two products of 2 x 2 matrices whose condition is below 1e3
-    np.testing.assert_allclose(normalised_square(vector, cov), expected, rtol=1e-12)
+    assert_allclose(normalised_square(vector, cov), expected, rtol=1e-12)
     shared = normalised_square(vector, cov[0, 0])  # one covariance for all
-    np.testing.assert_allclose(
+    assert_allclose(
         shared[2, 1], vector[2, 1] @ np.linalg.inv(cov[0, 0]) @ vector[2, 1], rtol=1e-12
     )
-    np.testing.assert_allclose(
-        nees(vector, Gaussian(0.5 * vector, cov)), np.array(expected) / 4, rtol=1e-12
-    )
-    np.testing.assert_allclose(nis(Innovations(vector, cov)), expected, rtol=1e-12)
+    assert_allclose(nees(vector, Gaussian(0.5 * vector, cov)), np.array(expected) / 4, rtol=1e-12)
+    assert_allclose(nis(Innovations(vector, cov)), expected, rtol=1e-12)
 
 
 def test_innovations_are_measurements_less_predictions(paths):
     model = tracking()
     system, _, offset = linear_system(model)
     predicted = predictions(kalman_filter(model), paths.y)
-    value, cov = found(model, paths.y)
+    value, cov = innovations_of(model, paths.y)
     for k, i in ((0, 0), (3, 17), (STEPS - 1, RUNS - 1)):
         P = predicted.cov[k, i]
-        np.testing.assert_allclose(
+        assert_allclose(
             value[k, i],
             paths.y[k, i] - system.H @ predicted.mean[k, i] - offset,
             rtol=1e-12,
             atol=1e-12,
         )
-        np.testing.assert_allclose(
+        assert_allclose(
             np.broadcast_to(cov, (STEPS, RUNS, 2, 2))[k, i],
             system.H @ P @ system.H.T + system.R,
             rtol=1e-12,
@@ -111,8 +110,8 @@ def test_the_autocorrelation_is_the_loop_of_the_page():
     result = autocorrelation(Innovations(value, cov), 3)
     for lag in (1, 2, 3):
         products = [white[k][i] @ white[k + lag][i] / 2 for k in range(6 - lag) for i in range(4)]
-        np.testing.assert_allclose(result.value[lag - 1], np.mean(products), rtol=1e-12, atol=1e-14)
-        np.testing.assert_allclose(
+        assert_allclose(result.value[lag - 1], np.mean(products), rtol=1e-12, atol=1e-14)
+        assert_allclose(
             result.standard_deviation[lag - 1], 1 / np.sqrt(2 * len(products)), rtol=1e-14
         )
 
@@ -123,11 +122,11 @@ def test_the_autocorrelation_is_the_loop_of_the_page():
 def test_the_alarms_are_the_sums_of_the_page():
     rng = np.random.default_rng(10)
     nu, steps = rng.normal(size=(40, 30, 2)), 40
-    found = alarms(Innovations(1.1 * nu, np.eye(2)), 0.8)
+    ours = alarms(Innovations(1.1 * nu, np.eye(2)), 0.8)
     expected = np.zeros((3, 30), dtype=bool)
     for i in range(30):
         s = 1.1 * nu[:, i]
-        total = sum(float(one @ one) for one in s)
+        total = sum(float(row @ row) for row in s)
         s = s / np.sqrt(total / (2 * steps))
         neighbours = sum(s[k] @ s[k + 1] for k in range(steps - 1))
         expected[0, i] = (
@@ -138,7 +137,7 @@ def test_the_alarms_are_the_sums_of_the_page():
         expected[1, i] = s.sum(axis=0) @ s.sum(axis=0) / steps > scipy.stats.chi2.ppf(0.8, 2)
         expected[2, i] = neighbours**2 / (2 * (steps - 1)) > scipy.stats.chi2.ppf(0.8, 1)
     assert (
-        np.array_equal(found, expected)
+        np.array_equal(ours, expected)
         and expected.any(axis=1).all()
         and not expected.all(axis=1).any()
     )
@@ -152,7 +151,7 @@ def test_a_confidence_ellipse_is_a_level_of_the_chi_squared_law():
     off = (confidence_ellipse(law, 0.9, points=7) - law.mean[:, None]).T
     level = np.einsum("ki,ij,kj->k", off, np.linalg.inv(law.cov), off)
     # an inverse of condition 40
-    np.testing.assert_allclose(level, scipy.stats.chi2.ppf(0.9, 2), rtol=1e-12)
+    assert_allclose(level, scipy.stats.chi2.ppf(0.9, 2), rtol=1e-12)
 
 
 # ---------------------------------------------------------------- what is refused

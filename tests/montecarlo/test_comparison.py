@@ -18,9 +18,9 @@ from kfcourse.filters.particles import particle
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.ensemble import instants, stratified, weights
+from kfcourse.montecarlo.ensemble import Ensemble, side_by_side, stratified, weights
 from kfcourse.montecarlo.experiment import batch_sizes, compare, run
-from kfcourse.montecarlo.statistics import Estimate, Sums, rejected
+from kfcourse.montecarlo.statistics import Estimate, Sums, claimed, rejected
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -44,7 +44,8 @@ def stored(model, runs, steps, seed):
     runs, p)."""
     sizes = batch_sizes(runs)
     _, *seeds = np.random.SeedSequence(seed).spawn(1 + len(sizes))
-    x, y, *_ = zip(*instants(model, sizes, steps, seeds), strict=True)
+    batches = [Ensemble(model, *of) for of in zip(sizes, [steps] * len(sizes), seeds, strict=True)]
+    x, y, *_ = zip(*side_by_side(batches), strict=True)
     return np.stack(x), np.stack(y)
 
 
@@ -109,20 +110,13 @@ def test_a_claim_of_variance_0_is_right_without_an_error_and_infinitely_wrong_wi
     x = np.array([1.0, -2.0, 3.0, 0.5, -1.5])
     p = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
 
-    def recorded(errors, cov):
-        sums = Sums.empty(1, 1, 1, 2)
-        law = Gaussian(np.zeros((5, 1)), cov)
-        sums.record(0, 0, errors[:, None], law, np.ones(5), np.array([0, 2]))
-        return sums.normalised[0, 0]
+    def normalised(errors, cov):
+        return claimed(errors[:, None], cov)[1].tolist()
 
-    known = np.where(p > 0, x, 0.0)
-    quotients = np.array([0.0, 2.0, 0.0, 1.0, 2.25])
-    np.testing.assert_allclose(
-        recorded(known, p[:, None, None]), [quotients[:2].sum(), quotients[2:].sum()], rtol=1e-14
-    )
-    assert recorded(known, np.array([[0.0]])).tolist() == [np.inf, np.inf]
-    assert recorded(np.zeros(5), np.array([[0.0]])).tolist() == [0, 0]
-    assert recorded(x, p[:, None, None]).tolist() == [np.inf, np.inf]
+    known, none = np.where(p > 0, x, 0.0), np.array([[0.0]])
+    assert normalised(known, p[:, None, None]) == [0.0, 2.0, 0.0, 1.0, 2.25]
+    assert normalised(known, none) == np.where(known, np.inf, 0.0).tolist()
+    assert normalised(x, p[:, None, None]) == [np.inf, 2.0, np.inf, 1.0, 2.25]
 
 
 def test_differences_and_ratios_are_paired(direct):
@@ -298,10 +292,15 @@ def test_what_is_better_than_the_exact_filter_refutes_it(variant53):
     own = {"aof-gaussian": np.ones(50), "aof-exact": np.full(50, 4.0)}
     refuted = by_hand(variant53, squares, own)
     assert refuted.doubtful.all() and np.isnan(refuted.gap("aof-gaussian").value).all()
-    healthy = by_hand(variant53, squares | {"aof-gaussian": 4 + rng.normal(size=50)}, own)
-    assert not healthy.doubtful.any()
-    unsure = replace(healthy, sums=healthy.sums._replace(doubt=np.full((1, 50), 0.8)))
-    assert unsure.doubtful.all()
+    noise = rng.normal(size=50)
+    noise = (noise - noise.mean()) / noise.std(ddof=1)
+    for errors, refutes in ((3, False), (6, True)):  # standard errors below the bound
+        better = squares | {"aof-gaussian": 4 + noise - errors / np.sqrt(50)}
+        assert by_hand(variant53, better, own).doubtful.all() == refutes
+    healthy = by_hand(variant53, squares | {"aof-gaussian": 4 + noise}, own)
+    for doubt, refutes in ((0.3, False), (0.5, True)):  # a tenth of the variance is .4
+        unsure = replace(healthy, sums=healthy.sums._replace(doubt=np.full((1, 50), doubt)))
+        assert unsure.doubtful.all() == refutes
 
 
 def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
@@ -312,6 +311,12 @@ def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
     result = by_hand(variant53, {"aof-gaussian": wild, "good": base, "bad": 1000 * base})
     assert [*result.lost] == ["aof-gaussian"]
     assert result.control == "good"
+    # a hundred times the best D_k, a tenth of it by one trajectory
+    for ordinary, far, lost in (
+        (1, 8e4, False), (1, 1.2e5, True), (200, 1.5e4, False), (200, 4e4, True),
+    ):  # fmt: skip
+        wild = np.where(np.arange(1000) == 7, far, ordinary)
+        assert bool(by_hand(variant53, {"wild": wild, "good": base}).lost) == lost
 
 
 def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
@@ -349,7 +354,8 @@ def test_a_slow_filter_that_fails_is_left_out(variant53):
 
     slow = replace(exact, slow=True, step=fails)
     result = compare([aof(gaussian(variant53)), slow], variant53, 100, 3, seed=1, progress=False)
-    assert result.names == ("aof-gaussian",) and str(result.left_out["aof-exact"]) == "it cannot"
+    assert result.names == ("aof-gaussian",)
+    assert str(result.left_out["aof-exact"]) == "step 1: aof-exact failed: it cannot"
 
 
 # ---------------------------------------------------------------- who is better
@@ -384,6 +390,9 @@ def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
         assert by_hand(variant53, {name: squares[name] for name in ("also", "same")}).leaders(
             0
         ) == ["also", "same"]
+    for more, worst in ((0.7e-8, ""), (1.5e-8, "worse")):  # parts of D_k
+        result = by_hand(variant53, {"best": base, "worse": (1 + more) * base})
+        assert result.verdicts()[0].worst == worst
 
 
 def test_where_all_errors_are_zero_filters_are_equal(variant53):
@@ -396,6 +405,10 @@ def test_where_all_errors_are_zero_filters_are_equal(variant53):
     assert np.isnan(result.relative("aof-linearised").value).all()  # of nothing, nothing is a part
     assert result.score("aof-linearised").standard_error == 0
     assert not any(verdict.worst for verdict in result.verdicts())
+    # of states of size 1 in doubles, (64 eps)^2 = 2e-28
+    for square, rounded in ((1.5e-28, True), (3e-28, False)):
+        result = by_hand(variant53, {"aof-gaussian": np.full(4, square)})
+        assert result.without_error.all() == rounded
 
 
 # ---------------------------------------------------------------- the table of the page

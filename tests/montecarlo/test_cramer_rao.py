@@ -1,6 +1,8 @@
 """The posterior bound: the Kalman covariance on linear models, an integral, below the exact filter,
 and where there is none."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -8,7 +10,7 @@ from scipy.stats import norm
 from kfcourse import Model, ModelError, run, simulate
 from kfcourse.filters import kalman_filter
 from kfcourse.lab import find_variant
-from kfcourse.montecarlo.cramer_rao import posterior_bound
+from kfcourse.montecarlo.cramer_rao import _mean, posterior_bound
 
 pytestmark = pytest.mark.quick
 
@@ -118,6 +120,11 @@ def test_an_infinite_mean_is_seen_in_several_dimensions_too():
         r"5000",
     ):
         posterior_bound(model, 5000, 2, seed=1)
+    for share, infinite in ((0.04, False), (0.06, True)):  # of one of a thousand
+        information = np.ones((1000, 1, 1))
+        information[7] = 999 * share / (1 - share)
+        with pytest.raises(ValueError, match="hangs on") if infinite else nullcontext():
+            _mean(information, "meter", 0)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, instants, simulate
-from kfcourse.montecarlo.experiment import Sample, compare, predictions, run
+from kfcourse.montecarlo.ensemble import Ensemble, side_by_side, simulate
+from kfcourse.montecarlo.experiment import _begun, compare, predictions, run
 from kfcourse.records import likelihood, smooth
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
@@ -62,9 +62,10 @@ def test_the_seed_decides_the_trajectories(variant53):
 
 def test_ensembles_side_by_side_are_those_alone(variant53):
     seeds = np.random.SeedSequence(6).spawn(2)
-    together = list(instants(variant53, [3, 5], 6, seeds))
-    for here, size, seed in ((slice(3), 3, seeds[0]), (slice(3, 8), 5, seeds[1])):
-        for one, both in zip(Ensemble(variant53, size, 6, seed), together, strict=True):
+    ensembles = [Ensemble(variant53, *part) for part in ((3, 6, seeds[0]), (5, 6, seeds[1]))]
+    together = list(side_by_side(ensembles))
+    for here, ensemble in zip((slice(3), slice(3, 8)), ensembles, strict=True):
+        for one, both in zip(ensemble, together, strict=True):
             for alone, side in zip(one[:3], both[:3], strict=True):
                 np.testing.assert_array_equal(side[here], alone)
 
@@ -182,10 +183,9 @@ def test_a_diverging_filter_is_named():
         good.init,
         lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)),
     )
-    with pytest.raises(
-        NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"
-    ):
-        compare([good, bad], model, 50, 4, seed=1, progress=False)
+    result = compare([good, bad], model, 50, 4, seed=1, progress=False)
+    reason = "step 2: bad became infinite or NaN although the trajectories are finite"
+    assert result.names == ("kalman",) and reason in str(result.left_out["bad"])
 
 
 # ---------------------------------------------------------------- seeds and shapes
@@ -226,8 +226,8 @@ def test_each_batch_of_a_comparison_has_particles_of_its_own(vector):
     """Errors of particles that were the same in all batches would not average out, and no interval
     would know."""
     seeds, cloud = np.random.SeedSequence(1).spawn(2), particle(vector, particles=20)
-    sample = Sample(vector, 1, [50, 50], seeds)
-    starts = [sample.part(slice(b, b + 1)).begun(cloud) for b in (0, 1, 0)]
+    batches = [Ensemble(vector, 50, 1, seed) for seed in seeds]
+    starts = [_begun(cloud, [batches[b]]) for b in (0, 1, 0)]
     first, second, again = (
         cloud.step(state, np.zeros((50, vector.p))).posterior.mean for state in starts
     )

@@ -1,7 +1,5 @@
 """A book of which nothing has changed is not built again, any other is."""
 
-from __future__ import annotations
-
 import build
 import pytest
 
@@ -41,7 +39,7 @@ def test_a_book_of_which_nothing_has_changed_stays(tree, capsys):
     for made in (
         "book/manual/a-set.md",
         "book/package/folder.md",
-        "book/equations.md",
+        "book/reference/equations.md",
         "kfcourse/__pycache__/c.pyc",
         "tests/d.py",
     ):

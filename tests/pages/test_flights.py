@@ -1,7 +1,5 @@
 """The pictures of a flight show what they are given; the table names its parts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt

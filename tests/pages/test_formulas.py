@@ -1,8 +1,6 @@
 """Formulas are set by the build: what is written of each, and what is said of one that cannot be
 set."""
 
-from __future__ import annotations
-
 import pytest
 from bs4 import BeautifulSoup
 from ext import formulas

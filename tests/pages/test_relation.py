@@ -9,6 +9,7 @@ from gate.relation import holds
 from gate.tex import is_relation, normal, pieces
 from gate.values import Indexed, Of, Unread
 from gate.worlds import world
+from numpy.testing import assert_allclose
 
 from kfcourse import Model, linearised
 from kfcourse.filters import aof
@@ -134,8 +135,8 @@ def test_the_linear_run_is_that_of_the_package():
     law = Gaussian(RUN[r"\lambda"][0,].ravel(), RUN[r"\Psi"][0,])
     for k in range(4):
         law = correct(system, law, RUN["y"][k,].ravel())
-        np.testing.assert_allclose(RUN["z"][k,].ravel(), law.mean)
-        np.testing.assert_allclose(RUN["p"][k,], law.cov)
+        assert_allclose(RUN["z"][k,].ravel(), law.mean)
+        assert_allclose(RUN["p"][k,], law.cov)
         law = predict(system, law)
 
 
@@ -155,8 +156,8 @@ def test_the_extended_run_is_that_of_the_package():
     state = ekf.init(1)
     for k in range(4):
         state = ekf.step(state, run["y"][k,].T)
-        np.testing.assert_allclose(run["z"][k,].T, state.posterior.mean)
-        np.testing.assert_allclose(run["p"][k,], state.posterior.cov.reshape(3, 3))
+        assert_allclose(run["z"][k,].T, state.posterior.mean)
+        assert_allclose(run["p"][k,], state.posterior.cov.reshape(3, 3))
 
 
 def test_a_world_is_made_of_definitions():

@@ -10,7 +10,7 @@ from kfcourse.symbolic.typesetting import WIDTH, equation_latex, symbols
 pytestmark = pytest.mark.quick
 
 
-def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
+def test_a_table_aligns_numbers_and_marks_what_is_not_there():
     shown = table(
         {"filter": ["a", "b"], "$D$ (m²)": [1.0, -2.25], "e": [(1.0, 0.125), np.nan]},
         ".2f",
@@ -26,13 +26,13 @@ def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
     assert "| 9999 |\n| −12,908.4 |" in table({"D": [9999, -12908.4]}).markdown
 
 
-def test_columns_of_a_table_have_one_length() -> None:
+def test_columns_of_a_table_have_one_length():
     for columns in ({}, {"a": [1], "b": [1, 2]}):
         with pytest.raises(ValueError, match="columns of one length"):
             table(columns)
 
 
-def test_long_equations_are_broken_between_terms() -> None:
+def test_long_equations_are_broken_between_terms():
     a, b = sp.symbols("a b")
     lines = equation_latex((sp.Symbol("f"), sp.expand((a + b) ** 9))).split("\\\\\n")
     assert len(lines) > 1 and all(symbols(line) < WIDTH + 8 for line in lines)
@@ -50,6 +50,6 @@ def test_long_equations_are_broken_between_terms() -> None:
     assert sp.expand(again - (a + b) ** 9) == 0
 
 
-def test_a_side_that_prints_like_the_one_before_is_printed_once() -> None:
+def test_a_side_that_prints_like_the_one_before_is_printed_once():
     a, b = sp.symbols("a b")
     assert equation_latex(("f", a * b, b * a, 2 * a)) == "f &= a b = 2 a"

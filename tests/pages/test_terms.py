@@ -1,8 +1,6 @@
 """The glossary: each term once, introduced by a page that there is, and what a page refers to on
 another page goes with it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -23,13 +21,14 @@ def test_the_glossary_is_in_order_and_says_each_thing_once():
         )  # pages without MathJax show it
     contents = (BOOK / "_toc.yml").read_text(encoding="utf-8")
     manual = {
-        f"manual/{path.name.replace('_', '-')}" for path in (BOOK.parent / "exercises").iterdir()
+        f"manual/{path.name.replace('_', '-')}"
+        for path in (BOOK.parent / "exercises" / "sets").iterdir()
     }
     for term in terms.terms():
         assert term.page in manual or f"- file: {term.page}\n" in contents, term
         page = term.page.removeprefix("manual/").replace("-", "_")
         path = (
-            BOOK.parent / "exercises" / page / "statement.md"
+            BOOK.parent / "exercises" / "sets" / page / "statement.md"
             if term.page in manual
             else BOOK / f"{term.page}.md"
         )
@@ -44,7 +43,7 @@ def test_the_notation_has_the_terms_of_the_glossary():
     """Each Russian term of its tables is one of the glossary's, in a row that names it."""
     known = {form: term for term in terms.terms() for form in map(terms.bare, term.ru)}
     seen, column = 0, None
-    for row in (BOOK / "notation.md").read_text(encoding="utf-8").splitlines():
+    for row in (BOOK / "course/notation.md").read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in re.sub(r"\$[^$]*\$|[*`]", " ", row).strip("|").split("|")]
         if "Russian" in row and row.startswith("|"):
             column = next(i for i, cell in enumerate(cells) if "Russian" in cell)

@@ -13,7 +13,7 @@ p = sp.Symbol("p", positive=True)
 K = sp.Symbol("K")
 
 
-def test_an_identity_is_printed_with_its_mark_and_its_label() -> None:
+def test_an_identity_is_printed_with_its_mark_and_its_label():
     shown = verified(((x + z) ** 2, x**2 + 2 * x * z + z**2), label="eq-square", how="for every x")
     assert shown.markdown.startswith(
         "$$\n\\begin{aligned}\n\\left(x + z\\right)^{2} &= x^{2} + 2 x z + z^{2}\n"
@@ -34,17 +34,17 @@ def test_an_identity_is_printed_with_its_mark_and_its_label() -> None:
         (r"\text{three sides}", x, x, z),
     ],
 )
-def test_a_false_equation_raises(wrong) -> None:
+def test_a_false_equation_raises(wrong):
     with pytest.raises(Unverified):
         verified(wrong)
 
 
-def test_the_message_says_what_is_left() -> None:
+def test_the_message_says_what_is_left():
     with pytest.raises(Unverified, match=r"left - right = 2\*x"):
         verified((x + z, z - x))
 
 
-def test_letters_of_matrices_stand_for_their_entries() -> None:
+def test_letters_of_matrices_stand_for_their_entries():
     A, B, C = (sp.MatrixSymbol(name, 2, 2) for name in "ABC")
     entries = {A: sp.Matrix([[x, z], [0, 1]]), B: sp.Matrix([[1, 0], [x, z]]), C: A * B}
     shown = verified((C.T, B.T * A.T), where=entries)
@@ -53,7 +53,7 @@ def test_letters_of_matrices_stand_for_their_entries() -> None:
         verified((C.T, A.T * B.T), where=entries)
 
 
-def test_numbers_to_so_many_digits() -> None:
+def test_numbers_to_so_many_digits():
     fourier = sp.Integral(sp.exp(-(x**2) / (2 * p)) * sp.cos(x), (x, -sp.oo, sp.oo))
     right = sp.sqrt(2 * sp.pi * p) * sp.exp(-p / 2)
     assert "to 10 digits, at 3 points" in verified((fourier, right), digits=10).markdown
@@ -63,7 +63,7 @@ def test_numbers_to_so_many_digits() -> None:
         verified((sp.Function("f")(x), x), digits=5)
 
 
-def test_what_is_printed_alike_needs_a_name() -> None:
+def test_what_is_printed_alike_needs_a_name():
     alike = sp.expand((x + 1) ** 2 - x**2 - 2 * x), sp.S.One
     assert r"s &= 1" in verified(("s", *alike)).markdown
     for sides in (alike, (sp.diag(*alike), sp.eye(2))):
@@ -71,7 +71,7 @@ def test_what_is_printed_alike_needs_a_name() -> None:
             verified(sides)
 
 
-def test_there_must_be_something_to_verify() -> None:
+def test_there_must_be_something_to_verify():
     for nothing in ((), ((r"\tau", x),), ("x = 1",)):
         with pytest.raises(ValueError, match=r"nothing to verify|needs an equation"):
             verified(*nothing)
@@ -79,7 +79,7 @@ def test_there_must_be_something_to_verify() -> None:
         claim("Everything is well.")
 
 
-def test_definitions_say_so() -> None:
+def test_definitions_say_so():
     shown = typeset((sp.Symbol("K"), p / (p + 1)), label="eq-gain")
     assert "kf-verified" not in shown.markdown and shown.markdown.endswith(
         '<p class="kf-said">definition</p>'
@@ -87,7 +87,7 @@ def test_definitions_say_so() -> None:
     assert shown._repr_mimebundle_()[VERIFIED]["equations"] == 0
 
 
-def test_claims_hold_or_raise() -> None:
+def test_claims_hold_or_raise():
     assert claim(
         "The gain is below **0.7**.", 0.6 < 0.7, np.array([True, True])
     ).markdown.startswith("The gain is below **0.7**.\u00a0<span")
@@ -111,7 +111,7 @@ def test_claims_hold_or_raise() -> None:
         claim("The gain is below 0.7.", True, np.array([True, False]))
 
 
-def test_agreement_within_a_tolerance() -> None:
+def test_agreement_within_a_tolerance():
     agree("They agree.", [1.0, 2.0], [1.0, 2.0 + 1e-13], within=1e-12)
     for other in ([1.0, 2.1], [1.0, np.nan], [1.0, 2.0, 3.0]):
         with pytest.raises(Unverified, match="They agree"):

@@ -40,8 +40,9 @@ def test_the_intervals_cover(edge, by_component):
     """300 records of 60 steps, a fifth of the cells empty: 95 % with a standard error of 1.3 %."""
     y, one = holed(60, 300, 7), aof(STRUCTURE)
     # with a narrower gate what it refuses, large in truth, makes the prediction after it too sure
-    gate = gated(one, min(edge, 0.9999), patience=None, by_component=by_component)
-    told = examine(one if edge == 1 else gate, y, edge, by_component)
+    if edge < 1:
+        one = gated(one, edge, patience=None, by_component=by_component)
+    told = examine(one, y)
     # not those whose track was lost
     kept = [run for run in range(300) if (told.weight[:, run] > 0).sum() > 30]
     assert len(kept) > 295
@@ -67,11 +68,5 @@ def test_a_wrong_filter_is_found():
 
 def test_nothing_is_found_of_a_record_that_is_refused():
     y = np.full((5, 1, 2), 1e6)
-    told = examine(gated(aof(STRUCTURE), 0.99, patience=None), y, 0.99)
+    told = examine(gated(aof(STRUCTURE), 0.99, patience=None), y)
     assert (told.weight == 0).all() and findings(told) == []
-
-
-@pytest.mark.parametrize("edge", [0.0, 2.0, np.nan])
-def test_an_edge_that_is_no_probability_is_refused(edge):
-    with pytest.raises(ValueError, match="edge must be the gate's probability"):
-        examine(aof(STRUCTURE), holed(3, 1, 1), edge)

@@ -20,31 +20,15 @@ from kfcourse.scenarios.radar import (
 
 pytestmark = pytest.mark.quick
 
-# Not the defaults: every number different, one turn to the right.
-OTHER = dict(
-    start=(3_000.0, 40_000.0, 9_000.0),
-    heading=0.4,
-    speeds=(180.0, 110.0),
-    radii=(4_000.0, 9_000.0),
-    turns=(-2.0, 1.2),
-    durations=(50.0, 45.0, 30.0),
-    descent=7.0,
-    ramp=6.0,
-)
+# Not the defaults: every number different.
+OTHER = dict(speeds=(180.0, 110.0), radii=(4_000.0, 9_000.0), descent=7.0, ramp=6.0)
 
 
 def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate():
     track = aircraft(1.3, **OTHER)
-    speeds, radii, turns, ramp = OTHER["speeds"], OTHER["radii"], OTHER["turns"], OTHER["ramp"]
-    ends = np.cumsum(
-        [
-            50.0,
-            abs(turns[0]) * radii[0] / speeds[0] + ramp,
-            45.0,
-            abs(turns[1]) * radii[1] / speeds[1] + ramp,
-            30.0,
-        ]
-    )
+    speeds, radii, ramp = OTHER["speeds"], OTHER["radii"], OTHER["ramp"]
+    first, second = 1.5 * np.pi * radii[0] / speeds[0], np.pi * radii[1] / speeds[1]
+    ends = np.cumsum([120.0, first + ramp, 60.0, second + ramp, 100.0])
 
     def smooth(u):
         u = min(max(u, 0.0), 1.0)
@@ -55,14 +39,14 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
 
     def slope(t, state):
         _, _, _, speed, heading = state
-        rate = -speeds[0] / radii[0] * bump(t, ends[0], ends[1]) + speeds[1] / radii[1] * bump(
+        rate = speeds[0] / radii[0] * bump(t, ends[0], ends[1]) + speeds[1] / radii[1] * bump(
             t, ends[2], ends[3]
         )
-        slowing = -(speeds[0] - speeds[1]) / (45.0 - ramp) * bump(t, ends[1], ends[2])
+        slowing = -(speeds[0] - speeds[1]) / (60.0 - ramp) * bump(t, ends[1], ends[2])
         sinking = -7.0 * smooth((t - ends[2]) / ramp)
         return [speed * np.cos(heading), speed * np.sin(heading), sinking, slowing, rate]
 
-    first = [*OTHER["start"], speeds[0], OTHER["heading"]]
+    first = [-15_000.0, 25_000.0, 8_500.0, speeds[0], 0.0]
     options = dict(method="DOP853", rtol=1e-12, atol=1e-9, max_step=0.5)
     solved = solve_ivp(slope, (0, track.time[-1]), first, t_eval=track.time, **options).y.T
     # Tolerance 1e-12 of 4e4 m over some 10^3 steps; the kinks of the ramps and the interpolation
@@ -79,9 +63,9 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
     [
         ({"interval": 0.0}, "interval must be positive"),
         ({"speeds": (200.0, -1.0)}, "speeds must be positive"),
-        ({"start": (0.0, np.inf, 1.0)}, "start must be finite numbers"),
-        ({"turns": (0.0, 1.0)}, "part 2 lasts 8 s, less than its two ramps"),
-        ({"descent": 40.0}, "start higher, lower `descent`"),
+        ({"radii": (6e3, np.inf)}, "radii must be positive and finite"),
+        ({"ramp": 31.0}, "part 3 lasts 60 s, less than its two ramps"),
+        ({"descent": 40.0}, "lower `descent`"),
     ],
 )
 def test_a_flight_that_cannot_be_flown_is_refused(change, message):
@@ -133,7 +117,7 @@ def test_measurements_that_cannot_be_are_refused(sigmas, runs, message):
 
 def test_matrices_of_the_kinematic_models():
     T, q, r = 0.7, 3.0, 20.0
-    system, _, _ = linear_system(kinematic(T, dimensions=2, order=1, noise_sd=q, measurement_sd=r))
+    system, _, _ = linear_system(kinematic(T, dimensions=2, noise_sd=q, measurement_sd=r))
     g = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
     np.testing.assert_allclose(
         system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15
@@ -141,19 +125,13 @@ def test_matrices_of_the_kinematic_models():
     np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
     np.testing.assert_allclose(system.R, r**2 * np.eye(2), rtol=1e-15)
     np.testing.assert_array_equal(system.H, np.eye(2, 4))
-    system, _, _ = linear_system(kinematic(T, dimensions=1, order=2, noise_sd=q))
-    g = np.array([[T**2 / 2], [T], [1]])
-    np.testing.assert_allclose(system.A, [[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]], rtol=1e-15)
-    np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
-    names = " ".join(s.name for s in kinematic(T, order=2).x)
-    assert names == "x y z vx vy vz ax ay az"
+    assert [s.name for s in kinematic(T).x] == ["x", "y", "z", "vx", "vy", "vz"]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"dimensions": 4}, "dimensions must be 1, 2 or 3"),
-        ({"order": 0}, "order 1 or 2"),
         ({"noise_sd": np.nan}, "noise_sd must be finite and not negative"),
     ],
 )

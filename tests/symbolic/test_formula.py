@@ -166,8 +166,8 @@ def test_what_has_no_real_value_or_no_end_is_refused(formula):
         ("exp(499)*x", "exp(500)*x", "argument of exp is too large"),
         ("1e99*x", "1e100*x", "number is too large or too small"),
         ("1e-99*x", "1e-400*x", "number is too large or too small"),
-        ("sin(x)", "sin(x, v)", "sin takes exactly one argument"),
-        ("atan2(x, v)", "atan2(x)", "atan2 takes exactly 2 arguments"),
+        ("sin(x)", "sin(x, v)", "sin takes 1 argument"),
+        ("atan2(x, v)", "atan2(x)", "atan2 takes 2 arguments"),
     ],
 )
 def test_a_limit_is_where_the_message_says(fits, too_much, message):

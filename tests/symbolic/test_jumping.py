@@ -66,7 +66,6 @@ def test_the_chain_may_depend_on_time_and_parameters(changes, chain):
         np.testing.assert_allclose(model.transition_at(k), chain(k), rtol=1e-14)
         np.testing.assert_allclose(model.law_at(k), law, rtol=1e-12)
         law = law @ np.array(chain(k))
-    assert "pi" in model.latex()
 
 
 def test_trajectories_follow_the_chain_and_the_mode_in_force():
@@ -165,11 +164,6 @@ def test_a_lost_trajectory_spoils_no_other():
     model = define(transition=[["1/(1 + x**2)", "x**2/(1 + x**2)"], [0.3, 0.7]])
     rows = model.transition_of(np.array([[1.0], [np.nan]]), 0)
     np.testing.assert_allclose(rows[0], [[0.5, 0.5], [0.3, 0.7]])
-
-
-def test_names_of_modes_are_set_as_text():
-    model = define(modes={"sound": {"parameters": {"C": 1}}, "half_dead": {"parameters": {"C": 2}}})
-    assert r"\text{mode half\_dead:}" in model.latex()
 
 
 def test_a_chain_that_fails_late_says_so_when_it_comes_there():

@@ -210,7 +210,7 @@ def test_large_means_lose_no_digits():
 
 def test_numerical_structures_have_no_formulas(variant53):
     for kind in ("unscented", "gauss-hermite"):
-        for ask in (lambda s: s["tau"], lambda s: s.latex(), lambda s: s.source()):
+        for ask in (lambda s: s["tau"], lambda s: s.latex()):
             with pytest.raises(NoClosedForm, match="quadrature"):
                 ask(KINDS[kind](variant53))
 
@@ -246,15 +246,6 @@ def test_an_exponential_of_a_large_constant_is_not_torn_apart():
 def test_what_is_no_rule_of_points_is_refused(variant53, build, problem):
     with pytest.raises(ModelError, match=problem):
         build(variant53)
-
-
-@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
-def test_the_source_that_runs_has_no_powers(variant53, kind):
-    for model in (variant53, van_der_pol(), vector_model()):
-        code = KINDS[kind](model).source()
-        assert "def predict(" in code
-        assert "def measure(" in code
-        assert "**" not in code
 
 
 def test_the_noiseless_model_has_its_noises_at_their_means():

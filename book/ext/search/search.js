@@ -7,8 +7,8 @@ const english = new Stemmer();  // Sphinx's, as `stopwords` are, of language_dat
 const ASKING = "what how why when where which who whose do does did can could should would i me my we our you your have has had am from than so "
   + "и в во на с со по для не из от о об к ко или при что как это где когда почему какой какая какие чем";
 const SILENT = new Set([...stopwords, ...ASKING.split(" ")]);
-const LESS = { package: 0.3, manual: 0.5, "sample-report.html": 0.4, "glossary.html": 0.7 };  // than a chapter
-const worth = (address) => LESS[address.split(/[/#]/)[0]] ?? 1;
+const LESS = { package: 0.3, manual: 0.5, "sample-report.html": 0.4, "reference/glossary.html": 0.7 };  // than a chapter
+const worth = (address) => Object.entries(LESS).find(([page]) => address.startsWith(page))?.[1] ?? 1;
 
 // A word without its ending: "errors" finds "error", "ошибки" finds "ошибка", "фильтрации" finds "фильтрация".
 function stem(word) {

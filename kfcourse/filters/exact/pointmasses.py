@@ -43,6 +43,7 @@ FINEST = 1e-6  # what a sum of eight kernels over five deviations allows
 TOLERABLE = 0.1  # error of a step, in deviations, beyond which there is no posterior
 CHUNK = 256  # trajectories that a thread takes at once: some milliseconds
 NEGLIGIBLE = 1e-12  # probability of a mode whose density need not be found
+PARTS = 16  # of a panel, in which a drawn state is uniform: some tenth of a deviation
 REASONS = (
     "its error is above a tenth of a deviation: the measurement contradicts the model, or digits "
     "are lost",
@@ -98,6 +99,27 @@ class PointMass(NamedTuple):
         p = np.exp(rows[:, :Q]) * self.probability[run, mode]
         return _points(rows)[0].ravel(), p.ravel()
 
+    def drawn(self, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """As of `Filter`: within a part of a panel all states are equally likely."""
+        from kfcourse.filters.exact.panels import COEFFICIENT, legendre
+
+        runs, modes = self.probability.shape
+        above = rng.random((number, runs, 1)) >= self.probability.cumsum(axis=1)[:, :-1]
+        mode = above.sum(axis=-1)
+        place = np.arange(runs) * modes + mode
+        points = np.linspace(-1, 1, PARTS + 1)
+        of_values = legendre.legvander(points, Q - 1) @ COEFFICIENT
+        density = np.maximum(np.exp(self.panels[:, :Q]) @ of_values.T, 0.0)
+        size = (self.panels[:, RIGHT] - self.panels[:, LEFT])[:, None] / PARTS
+        mass = (size * (density[:, 1:] + density[:, :-1]) / 2).ravel()
+        up_to = np.concatenate([[0.0], mass.cumsum()])
+        begin, end = up_to[self.begin[place] * PARTS], up_to[self.begin[place + 1] * PARTS]
+        wanted = begin + rng.random(mode.shape) * (end - begin)
+        part = np.clip(np.searchsorted(up_to, wanted) - 1, 0, len(mass) - 1)
+        row, inside = part // PARTS, (wanted - up_to[part]) / mass[part]
+        x = self.panels[row, LEFT] + size[row, 0] * (part % PARTS + inside)
+        return x[..., None], mode
+
     def discretisation_error(self) -> Array:
         """Estimated error of the posterior means, (runs,), in the units of x."""
         return self.error * np.sqrt(self.variance)
@@ -141,7 +163,15 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         )
     exact = Exact(model, printed(model), accuracy)
     back = exact.look_back if len(modes) == 1 else None
-    return Filter("aof-exact", modes[0], exact.init, exact.step, evidence=_evidence, look_back=back)
+    return Filter(
+        "aof-exact",
+        modes[0],
+        exact.init,
+        exact.step,
+        evidence=_evidence,
+        look_back=back,
+        drawn=lambda state, *how: state.memory.drawn(*how),
+    )
 
 
 def _evidence(before: State, y: Array, after: State) -> Array:

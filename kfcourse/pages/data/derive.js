@@ -1,4 +1,4 @@
-// "Derive it": the checker of kfcourse.derivations for a page without a server and without Python.  The same trees, the same
+// "Derive it": the checker of kfcourse.exercises.derivations for a page without a server and without Python.  The same trees, the same
 // search for slips; equality by values at random points, means by Gauss-Hermite quadrature.  tests/pages/test_derive.py holds
 // its verdicts against the package's.
 (function () {
@@ -534,7 +534,7 @@
     return IF_POSITIVE;
   }
 
-  // ---------------------------------------------------------------- slips (see kfcourse/derivations/slips.py)
+  // ---------------------------------------------------------------- slips (see exercises/derivations/slips.py)
 
   const starts = (path, with_) => with_.every((one, i) => path[i] === one);
 

@@ -16,13 +16,13 @@ more.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.errors import expect
-from kfcourse.laws import Array, Gaussian, Measurement, correct, stacked
+from kfcourse.laws import Array, Gaussian, correct, stacked
 from kfcourse.linear.runs import check_prior
 from kfcourse.scenarios.navigation.dynamics import Dynamics, Inputs, Predictor, predictor, rounding
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
@@ -35,16 +35,6 @@ class Event(NamedTuple):
     arrival: float
     sensor: Sensor
     value: Array
-
-
-class Past(NamedTuple):
-    """What the filter remembers: the law right after an event (the prior has none), and what it
-    expected of the measurement."""
-
-    time: float
-    event: Event | None
-    law: Gaussian
-    expected: Measurement | None = None
 
 
 class Innovation(NamedTuple):
@@ -65,6 +55,16 @@ class Innovation(NamedTuple):
     time: float
     innovation: Array
     cov: Array
+
+
+class Past(NamedTuple):
+    """What the filter remembers: the law right after an event, and what this told; the prior has
+    none."""
+
+    time: float
+    law: Gaussian
+    event: Event | None = None
+    innovation: Innovation | None = None
 
 
 class Followed(NamedTuple):
@@ -116,7 +116,7 @@ def fuse(
         Sensors not known or of another state, moments not finite, before 0, or after the
         arrival; a prior with a negative variance; shapes that do not fit.
     """
-    return _run(dynamics, sensors, prior, observations, times, inputs, by, lambda past: None)
+    return follow(dynamics, sensors, prior, observations, times, inputs=inputs, by=by).law
 
 
 def follow(
@@ -135,30 +135,6 @@ def follow(
     Arguments and errors as of `fuse`.  What arrives after the last of `times` is not used, and told
     nothing.
     """
-    innovations: list[Innovation] = []
-
-    def keep(past: Past) -> None:
-        if past.event and past.expected:
-            innovation, F = past.expected.innovation(past.event.value), past.expected.F
-            of = past.event.sensor.name, past.event.time
-            innovations.append(Innovation(*of, innovation, F.reshape(-1, *F.shape[-2:])))
-
-    laws = _run(dynamics, sensors, prior, observations, times, inputs, by, keep)
-    return Followed(laws, innovations)
-
-
-def _run(
-    dynamics: Dynamics,
-    sensors: Sequence[Sensor],
-    prior: Gaussian,
-    observations: Sequence[Observation],
-    times: Array,
-    inputs: Inputs | None,
-    by: str,
-    keep: Callable[[Past], None],
-) -> Gaussian:
-    """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of
-    what is left in the end."""
     expect(dynamics, Dynamics, "fuse")
     predict, n = predictor(dynamics, inputs), len(dynamics.A)
     for sensor in sensors:
@@ -174,8 +150,8 @@ def _run(
     events = sorted(_events(sensors, observations, by, slack), key=lambda event: event.arrival)
     # seconds that the filter must remember
     depth = max((event.arrival - event.time for event in events), default=0.0)
-    history = [Past(0.0, None, _checked_prior(prior, n, events, inputs))]
-    laws, taken = [], 0
+    history = [Past(0.0, _checked_prior(prior, n, events, inputs))]
+    laws, innovations, taken = [], list[Innovation](), 0
     for now in moments:
         arrived = events[
             taken : bisect_right(events, now + slack, lo=taken, key=lambda event: event.arrival)
@@ -183,13 +159,12 @@ def _run(
         taken += len(arrived)
         history = _replayed(history, arrived, predict)
         laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
-        oldest = _oldest_needed(history, now - depth - slack)
-        for past in history[:oldest]:
-            keep(past)
-        history = history[oldest:]
-    for past in history:
-        keep(past)
-    return stacked(laws)
+        # from the last law at or before the earliest moment that a measurement may still come from
+        oldest = bisect_right(history, now - depth - slack, key=lambda past: past.time) - 1
+        innovations += [past.innovation for past in history[: max(oldest, 0)] if past.innovation]
+        history = history[max(oldest, 0) :]
+    innovations += [past.innovation for past in history if past.innovation]
+    return Followed(stacked(laws), innovations)
 
 
 def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
@@ -203,14 +178,11 @@ def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> 
     for event in sorted(again, key=lambda event: event.time):
         law = predict(history[-1].law, history[-1].time, event.time)
         expected = event.sensor.measure(*law)
-        history.append(Past(event.time, event, correct(law, expected, event.value), expected))
+        innovation, F = expected.innovation(event.value), expected.F
+        of = event.sensor.name, event.time, innovation, F.reshape(-1, *F.shape[-2:])
+        law = correct(law, expected, event.value)
+        history.append(Past(event.time, law, event, Innovation(*of)))
     return history
-
-
-def _oldest_needed(history: list[Past], reach: float) -> int:
-    """Index of the last law at or before the earliest moment that a measurement may still come
-    from."""
-    return max(bisect_right(history, reach, key=lambda past: past.time) - 1, 0)
 
 
 def _events(

@@ -1,0 +1,462 @@
+"""Self-checks: is an answer right, and if not, what kind of mistake does it look like?
+
+A `Question` holds the right answer and a catalogue of mistakes, wrong answers that students give,
+each with what to say of it. The student's function and they are called with the same hidden
+arguments; an answer that equals a mistake is recognised by name. Nothing that a student hands in
+may crash a check, and no message contains the answer.
+"""
+
+from __future__ import annotations
+
+import copy
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import permutations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+
+import kfcourse
+from kfcourse.exercises.checks.derived import Derivation
+from kfcourse.exercises.checks.diagnosis import GENERAL, Wrong, part_of
+from kfcourse.exercises.checks.editing import rebound, uses
+from kfcourse.exercises.checks.equality import Places, Unusable, equal, like, with_values
+from kfcourse.exercises.checks.hints import Agree
+from kfcourse.exercises.checks.question import (
+    MISSING,
+    NOT_CHECKED,
+    PASSED,
+    UNUSABLE,
+    WRONG,
+    Answer,
+    Attempts,
+    ForVariant,
+    Mistake,
+    Question,
+    Result,
+)
+from kfcourse.exercises.checks.registry import folders
+from kfcourse.limits import OutOfTime, time_limit
+
+if TYPE_CHECKING:
+    from kfcourse.exercises.checks.exercises import Exercise
+
+OURS = Path(kfcourse.__file__).resolve().parent, Path(__file__).resolve().parents[1]
+SECONDS = 20.0  # an answer may take
+DIAGNOSIS = 60.0  # the search for the kind of mistake
+
+
+class Missing(Exception):
+    """The student has not written this answer yet."""
+
+
+def call(
+    answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], seconds: float
+) -> list[Any]:
+    """The answer's results for every tuple of arguments, in the form of the expected ones.
+
+    Raises
+    ------
+    Missing
+        It raises NotImplementedError.
+    Unusable
+        It is not callable, fails, takes too long, or returns something of another form.
+    """
+    if not callable(answer):
+        raise Unusable(
+            f"expected a function, got {type(answer).__name__}; pass the function itself, without "
+            f"calling it"
+        )
+    results = []
+    try:
+        with time_limit(seconds), np.errstate(all="ignore"):
+            for values, wanted in zip(arguments, expected, strict=True):
+                results.append(_formed(answer(*copy.deepcopy(values)), wanted))
+    except OutOfTime as late:
+        # an answer in another process may have a limit of its own
+        took = late.args[0] if late.args else seconds
+        raise Unusable(
+            f"still running after {took:g} s: is there a loop that never ends?"
+        ) from None
+    except (Missing, Unusable, KeyboardInterrupt):  # whoever stops the kernel means the check too
+        raise
+    except RecursionError:
+        raise Unusable("calls itself without end (RecursionError)") from None
+    except BaseException as error:
+        if isinstance(error, NotImplementedError) and not in_library(error):
+            raise Missing from None
+        raise Unusable(f"stops with {in_a_line(error)}") from None
+    return results
+
+
+def _formed(result: Any, wanted: Any) -> Any:
+    """The result in the form of the expected one; says so if only the order is another."""
+    try:
+        return like(result, wanted)
+    except Unusable as reason:
+        if (
+            not isinstance(wanted, tuple)
+            or not isinstance(result, tuple | list)
+            or len(result) != len(wanted)
+        ):
+            raise
+        if any(_fits(order, wanted) for order in permutations(result)):
+            raise Unusable(f"{reason}: are the results in another order?") from None
+        raise
+
+
+def _fits(result: Any, wanted: Any) -> bool:
+    try:
+        like(result, wanted)
+    except Exception:  # of nonsense of the student's
+        return False
+    return True
+
+
+def _frames(error: BaseException) -> list[traceback.FrameSummary]:
+    return list(traceback.extract_tb(error.__traceback__))
+
+
+def _foreign(frame: traceback.FrameSummary) -> bool:
+    """Whether the line is of a library or of this package, not of a student."""
+    own = Path(frame.filename)
+    return "site-packages" in frame.filename or any(
+        own.is_relative_to(folder) for folder in (*OURS, *folders())
+    )
+
+
+def in_library(error: BaseException) -> bool:
+    return _foreign(_frames(error)[-1])
+
+
+def in_a_line(error: BaseException) -> str:
+    """The error in one line, with the student's own line of code."""
+    try:
+        text = " ".join(str(error).split())[:200]
+    except Exception:  # of a class of the student's
+        text = "no message"
+    if isinstance(error, TypeError) and ("to float" in text or "ufunc" in text):
+        text += " (functions of symbols are sp.sin, sp.exp, ..., not those of math or NumPy)"
+    elif "NDimArray" in text or "to Python scalars" in text:
+        text += " (functions of arrays are np.sin, np.exp, ..., not those of math or SymPy)"
+    elif isinstance(error, np.linalg.LinAlgError) and "did not converge" in text:
+        text += " (is there NaN or infinity in what it was given?)"
+    elif isinstance(error, TypeError) and "for ^:" in text:
+        text += " (a power is **)"
+    own = [frame for frame in _frames(error) if not _foreign(frame)]
+    where = f", in line {own[-1].lineno} of {own[-1].name}()" if own else ""
+    return f"{type(error).__name__}{': ' * bool(text)}{text}{where}"
+
+
+def check(
+    question: Question,
+    exercise: Exercise,
+    answer: Any,
+    seconds: float = SECONDS,
+    past: Attempts | None = None,
+) -> Result:
+    """Check an answer to a question; never raises, whatever the answer is, and whatever fails in
+    the check itself.
+
+    `past` is what was handed in before, of the same notebook; the answer is added to it.
+    """
+    past = Attempts() if past is None else past
+    past.wrong.pop(question.name, None)
+    try:
+        result = _Check(posed(question, exercise), answer, seconds, past).result()
+    except Exception as error:
+        says = (
+            "The check itself failed, and that is not your fault. It counts for nothing; "
+            "please tell your teacher."
+        )
+        return Result(question.name, question.title, NOT_CHECKED, says, trouble=_trouble(error))
+    if result.status == WRONG:
+        past.wrong[question.name] = answer
+    return result
+
+
+def _trouble(error: Exception) -> str:
+    """Kind and place of an error of ours, for the teacher."""
+    frames = [
+        f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in _frames(error)
+    ]
+    return f"{in_a_line(error)} ({' < '.join(reversed(frames[-4:]))})"
+
+
+def posed(question: Question, exercise: Exercise) -> Posed:
+    """The question as it is posed in an exercise, which keeps it: answers are compared with the
+    same again and again."""
+    return exercise.posed.setdefault(question, Posed(question, exercise))
+
+
+@dataclass(frozen=True)
+class Posed:
+    """What is asked, and what our own answers give."""
+
+    question: Question
+    exercise: Exercise
+
+    @cached_property
+    def arguments(self) -> list[tuple]:
+        return list(self.question.arguments(self.exercise))
+
+    @cached_property
+    def key(self) -> Answer:
+        return self.question.answer(self.exercise)
+
+    @cached_property
+    def expected(self) -> list[Any]:
+        if isinstance(self.question, Derivation):
+            return [""]  # a text: what it should say follows from its own lines
+        return _reference(self.key, self.arguments)
+
+    @cached_property
+    def known(self) -> list[tuple[Mistake, list[Any] | None]]:
+        """Mistakes with their results, None where impossible."""
+        return [
+            (mistake, _wrong(mistake, self.exercise, self.arguments, self.expected))
+            for mistake in self.question.mistakes
+        ]
+
+    @cached_property
+    def values(self) -> dict[sp.Symbol, Any]:
+        """Of the parameters: of the model's symbols that are no arguments of the answer."""
+        given = {
+            s.name
+            for values in self.arguments
+            for v in values
+            if hasattr(v, "free_symbols")
+            for s in v.free_symbols
+        }
+        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
+
+    @cached_property
+    def agree(self) -> Agree:
+        return partial(
+            _agree,
+            values=self.values,
+            tolerance=self.question.tolerance,
+            places=self.exercise.places,
+        )
+
+
+@dataclass(frozen=True)
+class _Check:
+    """An answer to a question."""
+
+    posed: Posed
+    answer: Any
+    seconds: float
+    past: Attempts
+
+    @property
+    def question(self) -> Question:
+        return self.posed.question
+
+    @property
+    def exercise(self) -> Exercise:
+        return self.posed.exercise
+
+    def _says(self, status: str, message: str, **more: Any) -> Result:
+        return Result(self.question.name, self.question.title, status, message, **more)
+
+    def result(self) -> Result:
+        try:
+            answered = call(self.answer, self.posed.arguments, self.posed.expected, self.seconds)
+        except Missing:
+            return self._says(MISSING, "not implemented yet")
+        except Unusable as reason:
+            return self._says(UNUSABLE, str(reason))
+        if isinstance(self.question, Derivation):
+            return self._derived(self.question, answered)
+        try:
+            with time_limit(self.seconds):
+                if self.posed.agree(answered, self.posed.expected):
+                    self.past.given.pop(self.question.name, None)
+                    return self._says(PASSED, "right", share=1.0)
+        except OutOfTime:
+            return self._says(
+                UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it"
+            )
+        try:
+            with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
+                return self._wrong(answered)
+        except OutOfTime:
+            return self._says(WRONG, f"not right. {GENERAL}")
+        # of ours: the answer is wrong all the same, only the hint is lost
+        except Exception as error:
+            return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
+
+    def _derived(self, question: Derivation, answered: list[str]) -> Result:
+        try:
+            with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
+                judged = question.judge(self.exercise, answered[0])
+        except Unusable as reason:
+            return self._says(UNUSABLE, str(reason))
+        except OutOfTime:
+            return self._says(
+                UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
+            )
+        message = judged.message
+        if judged.status == PASSED:
+            self.past.given.pop(question.name, None)
+        elif self._times(answered) and question.advice:
+            message += f" {question.advice}"
+        return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
+
+    def _numbers(self, answered: list[Any]) -> bool:
+        """Whether all formulas that are wrong lack parameters, and are right with numbers in their
+        place."""
+        pairs = zip(_flat(answered), _flat(self.posed.expected), strict=True)
+        wrong = [pair for pair in pairs if not self.posed.agree(*([side] for side in pair))]
+        names = {s.name for s in self.posed.values}
+        return bool(wrong) and all(
+            names & {s.name for s in right.free_symbols} - {s.name for s in mine.free_symbols}
+            and self.posed.agree(
+                *([with_values(side, self.posed.values)] for side in (mine, right))
+            )
+            for mine, right in wrong
+        )
+
+    def _wrong(self, answered: list[Any]) -> Result:
+        pairs = [
+            (part_of(answered, place), part_of(self.posed.expected, place))
+            for place in range(len(self.question.parts))
+        ]
+        right = [1 for mine, theirs in pairs if self.posed.agree(mine, theirs)]
+        share = len(right) / len(self.question.parts) if right else 0.0
+        times = self._times(answered)
+        follows = self._follows(answered)
+        if follows:
+            says = (
+                f"this step is right on top of your {' and '.join(follows)}; what is not right "
+                f"yet is there: look there first."
+            )
+            return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
+        if self._numbers(answered):
+            return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
+        posed = self.posed
+        answers = posed.key, self.answer
+        wrong = Wrong(
+            self.question,
+            answers,
+            posed.arguments,
+            answered,
+            posed.expected,
+            posed.known,
+            posed.agree,
+        )
+        message, names, explained = wrong.description()
+        more = [] if explained else [wrong.case(self.posed.values)]
+        if times and self.question.advice:
+            more.insert(0, self.question.advice)
+        if times > (1 if self.question.advice else 0) and explained:
+            more.append(wrong.case(self.posed.values))
+        return self._says(
+            WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share
+        )
+
+    def _times(self, answered: list[Any]) -> int:
+        """How many times in a row the same wrong results have come before."""
+        before, times = self.past.given.get(self.question.name, (None, 0))
+        again = before is not None and self.posed.agree(answered, before)
+        self.past.given[self.question.name] = answered, times + 1 if again else 1
+        return times if again else 0
+
+    def _follows(self, answered: list[Any]) -> tuple[str, ...]:
+        """Earlier questions on whose wrong answers this one is right: all of them, or one."""
+        key = self.question.key
+        own_step = key.step if isinstance(key, ForVariant) else key
+        if own_step is None:
+            return ()
+        earlier = {
+            question.function: question
+            for question in self.exercise.questions.values()
+            if question.name in self.past.wrong
+        }
+        own = [function for function in earlier if function in uses(own_step)]
+        for chosen in ([own] if len(own) > 1 else []) + [[function] for function in own]:
+            try:
+                answers = {function: self._in_form(earlier[function]) for function in chosen}
+                step = rebound(own_step, answers)
+                with time_limit(self.seconds):
+                    theirs = [
+                        like(step(*copy.deepcopy(values)), wanted)
+                        for values, wanted in zip(
+                            self.posed.arguments, self.posed.expected, strict=True
+                        )
+                    ]
+                    if self.posed.agree(answered, theirs):
+                        return tuple(earlier[function].name for function in chosen)
+            except (Exception, OutOfTime):  # of the earlier answer
+                continue
+        return ()
+
+    def _in_form(self, question: Question) -> Answer:
+        """A wrong answer to an earlier question with results in the form of the key's, as our own
+        functions take them."""
+        key, wrong = question.answer(self.exercise), self.past.wrong[question.name]
+        return lambda *values: like(
+            wrong(*copy.deepcopy(values)), standard(key(*copy.deepcopy(values)))
+        )
+
+
+def _flat(result: Any) -> list[sp.Expr]:
+    """All formulas of a result, or of several; none of numbers."""
+    if isinstance(result, list | tuple | sp.MatrixBase):
+        return [formula for part in result for formula in _flat(part)]
+    return [result] if isinstance(result, sp.Basic) else []
+
+
+def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
+    """Results of an answer of ours, in a form that others are compared with."""
+    return [standard(answer(*copy.deepcopy(values))) for values in arguments]
+
+
+def standard(value: Any) -> Any:
+    """A result in the form in which results are compared: formulas, arrays of floats, texts, and
+    tuples of them."""
+    if isinstance(value, tuple | list):
+        return tuple(standard(part) for part in value)
+    return (
+        value
+        if isinstance(value, sp.Basic | sp.MatrixBase | str)
+        else np.asarray(value, dtype=float)
+    )
+
+
+def _agree(
+    answered: Sequence[Any],
+    expected: Sequence[Any],
+    values: Mapping[sp.Symbol, Any],
+    tolerance: float,
+    places: Places = (),
+) -> bool:
+    return all(
+        equal(a, b, tolerance, values, places) for a, b in zip(answered, expected, strict=True)
+    )
+
+
+def _wrong(
+    mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], expected: Sequence[Any]
+) -> list[Any] | None:
+    """Results of a known wrong answer; None if this variant does not allow the mistake."""
+    try:
+        wrong = mistake.answer(exercise)
+        return [
+            like(wrong(*copy.deepcopy(values)), wanted)
+            for values, wanted in zip(arguments, expected, strict=True)
+        ]
+    # of shapes, mostly; a test makes sure that each mistake is known where it is possible
+    except Exception:
+        return None
+
+
+NUMBERS = (
+    "Right in numbers, but the parameters are asked for as symbols: type their letters "
+    "where their values stand."
+)

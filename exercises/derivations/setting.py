@@ -1,0 +1,243 @@
+"""What letters mean in a derivation: the law of the state, the noises, the structural functions of
+a model.
+
+Means M[...] are over a normal law of the state, x ~ N(m, d), and over standard normal noises,
+independent of it and of each
+other.  A structural function is a tree with means in it, so that it is computed as everything else
+is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.exercises.derivations.terms import Node, difference, letter, mean, power, product
+from kfcourse.exercises.derivations.typed import tree_of
+from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
+
+KINDS = ("gaussian", "linearised")
+OF_FILTERS = (
+    "y",
+    "K",
+    "R",
+    "lambda",
+    "Psi",
+    "m",
+    "d",
+    "z",
+    "p",
+    "tau",
+    "Theta",
+    "h",
+    "G",
+    "F",
+)  # letters of a filter's equations
+
+
+@dataclass(frozen=True)
+class Law:
+    """Which letters are random: states of a normal law with these letters for mean and covariance,
+    and standard normal noises."""
+
+    states: tuple[str, ...] = ("x",)
+    means: tuple[str, ...] = ("m",)
+    cov: tuple[tuple[str, ...], ...] = (("d",),)
+    noises: tuple[str, ...] = ("v", "w")
+
+    @property
+    def random(self) -> tuple[str, ...]:
+        return self.states + self.noises
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Of means and covariances, each once."""
+        return tuple(dict.fromkeys([*self.means, *(name for row in self.cov for name in row)]))
+
+    def at(self, mean: str, cov: str) -> Law:
+        """The same with other letters for mean and covariance; components are numbered."""
+        n = len(self.states)
+        if n == 1:
+            return replace(self, means=(mean,), cov=((cov,),))
+        pairs = [[f"{cov}{min(i, j) + 1}{max(i, j) + 1}" for j in range(n)] for i in range(n)]
+        return replace(
+            self, means=tuple(f"{mean}{i + 1}" for i in range(n)), cov=tuple(map(tuple, pairs))
+        )
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What letters mean.
+
+    Attributes
+    ----------
+    law : Law
+    meanings : mapping
+        Name to tree, of what is no free letter: structural functions of a model, what was derived
+        before.
+    positive : frozenset of str
+        Letters that were declared positive; variances are without saying.
+    known : frozenset of str, optional
+        Letters that may be used; without it, all.
+    model : Model, optional
+    kind : {"gaussian", "linearised"}
+        Which structural functions tau, Theta, h, G, F are.
+    """
+
+    law: Law = field(default_factory=Law)
+    meanings: Mapping[str, Node] = field(default_factory=dict)
+    positive: frozenset[str] = frozenset()
+    known: frozenset[str] | None = None
+    model: Model | None = None
+    kind: str = "gaussian"
+
+    @cached_property
+    def variances(self) -> frozenset[str]:
+        return frozenset(self.law.cov[i][i] for i in range(len(self.law.states)))
+
+    def problem(self, name: str) -> str | None:
+        """What is wrong with a letter; None if it may be used."""
+        if self.known is None:
+            return None
+        # nothing is random: there is no law either
+        of_law = self.law.letters if self.known.intersection(self.law.random) else ()
+        known = {*self.known, *self.meanings, *of_law}
+        if name in known:
+            return None
+        names = ", ".join(sorted(known))
+        return (
+            f"unknown letter {name!r}; known here: {names}. Declare another one in a line of "
+            f"its own: letters {name}"
+        )
+
+    def at(self, mean_name: str, cov_name: str) -> Setting:
+        """The same for a law x ~ N(mean, covariance) with these letters."""
+        return with_functions(replace(self, law=self.law.at(mean_name, cov_name)))
+
+    def defining(self, name: str, tree: Node) -> Setting:
+        """The same where a name stands for what was derived."""
+        return replace(self, meanings={**self.meanings, name: tree})
+
+
+def of_model(model: Model, kind: str = "gaussian") -> Setting:
+    """The setting of a model: its parameters, noises and structural functions; tau and Theta take x
+    ~ N(z, p) (see `of_side`).
+
+    Raises
+    ------
+    ModelError
+        Its noises are not standard normal, or its equations depend on the step.
+    """
+    for law_, which in ((model.state_noise, "state_noise"), (model.meter_noise, "meter_noise")):
+        if np.any(law_.mean != 0) or np.any(law_.cov != np.eye(len(law_.mean))):
+            raise ModelError(
+                f"derivations are checked for standard normal noises, and `{which}` is another "
+                f"law; scale it in the equation"
+            )
+    if model.timed:
+        raise ModelError("derivations are checked for equations that do not depend on the step")
+    states, noises = tuple(s.name for s in model.x), tuple(s.name for s in (*model.v, *model.w))
+    law = Law(states, noises=noises).at(
+        *(f"{name}_" if name in model.parameters else name for name in ("m", "d"))
+    )
+    known = {*states, *noises, *model.parameters, *OF_FILTERS}
+    return with_functions(Setting(law, known=frozenset(known), model=model, kind=kind))
+
+
+def of_side(setting: Setting, name: str) -> Setting:
+    """The setting of a chain that begins with this name: tau and Theta are functions of z and p."""
+    given = setting.model is None or setting.law != of_model(setting.model).law
+    return setting if given or not re.fullmatch(r"(tau|Theta)\d*", name) else setting.at("z", "p")
+
+
+def with_functions(setting: Setting) -> Setting:
+    """The setting with the structural functions of its model at its law; a letter of the model
+    keeps its own meaning."""
+    if setting.model is None:
+        return setting
+    model, law = setting.model, setting.law
+    n = len(law.states)
+    own = (
+        {s.name for s in (*model.x, *model.v, *model.w)} | set(model.parameters) | set(law.letters)
+    )
+    meanings: dict[str, Node] = {}
+    if setting.kind == "gaussian":
+        for first, second, equations in (
+            ("tau", "Theta", model.state_equation),
+            ("h", "F", model.meter_equation),
+        ):
+            meanings |= _moments(first, second, [tree_of(equation) for equation in equations], own)
+        for i, equation in enumerate(model.meter_equation):
+            for j, x in enumerate(model.x):
+                meanings[_entry("G", i, j, model.p, n)] = mean(tree_of(sp.diff(equation, x)))
+    else:
+        meanings |= _linearised(model, law)
+    meanings |= {
+        name: tree_of(equation)
+        for name, equation in zip(model.measured, model.meter_equation, strict=True)
+    }
+    return replace(
+        setting, meanings={name: tree for name, tree in meanings.items() if name not in own}
+    )
+
+
+def _entry(name: str, i: int, j: int, rows: int, columns: int) -> str:
+    return name if rows == columns == 1 else f"{name}{i + 1}{j + 1}"
+
+
+def _moments(first: str, second: str, equations: list[Node], taken: set[str]) -> dict[str, Node]:
+    """Means and covariances of equations; a covariance is around the mean's own letter, so that it
+    follows what was derived."""
+    size = len(equations)
+    names = [first if size == 1 else f"{first}{i + 1}" for i in range(size)]
+    meanings = {name: mean(equation) for name, equation in zip(names, equations, strict=True)}
+    for i in range(size):
+        for j in range(i, size):
+            deviations = [
+                difference(
+                    equations[k], meanings[names[k]] if names[k] in taken else letter(names[k])
+                )
+                for k in (i, j)
+            ]
+            tree = mean(power(deviations[0], 2) if i == j else product(*deviations))
+            meanings[_entry(second, i, j, size, size)] = meanings[
+                _entry(second, j, i, size, size)
+            ] = tree
+    return meanings
+
+
+def _linearised(model: Model, law: Law) -> dict[str, Node]:
+    """The equations and their slopes at the mean, and A p A^T + B B^T."""
+    at_mean = dict(zip(model.x, map(symbol, law.means), strict=True)) | {
+        s: sp.S.Zero for s in (*model.v, *model.w)
+    }
+    cov = sp.Matrix(len(law.states), len(law.states), lambda i, j: symbol(law.cov[i][j]))
+    meanings: dict[str, sp.Expr] = {}
+    for first, second, equation, noise in (
+        ("tau", "Theta", model.state_equation, model.v),
+        ("h", "F", model.meter_equation, model.w),
+    ):
+        A, B = (
+            equation.jacobian(sp.Matrix(variables)).subs(at_mean, simultaneous=True)
+            for variables in (model.x, noise)
+        )
+        values, size = equation.subs(at_mean, simultaneous=True), equation.rows
+        covariance = A * cov * A.T + B * B.T
+        meanings |= {first if size == 1 else f"{first}{i + 1}": values[i] for i in range(size)}
+        meanings |= {
+            _entry(second, i, j, size, size): covariance[i, j]
+            for i in range(size)
+            for j in range(size)
+        }
+        if first == "h":
+            meanings |= {
+                _entry("G", i, j, *A.shape): A[i, j] for i in range(A.rows) for j in range(A.cols)
+            }
+    return {name: tree_of(formula) for name, formula in meanings.items()}

@@ -1,0 +1,398 @@
+"""Which single change of a line makes it equal to the one above?
+
+Changes are tried, one node of the line at a time: the sign of a term, a number in front, a power, a
+letter for another one, a factor or a term lost or too much, a moment of the normal law for another
+one.  So are changes of the line above: what of it would give this line?  Values at a few random
+points choose; the line with the change must then be equal to the one above, as lines are compared.
+What a sum lacks is found as q c, c of letters, from its values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import chain
+from math import gcd, prod
+from typing import Any
+
+import numpy as np
+
+from kfcourse.exercises.derivations.compared import EQUAL, compare
+from kfcourse.exercises.derivations.setting import Setting
+from kfcourse.exercises.derivations.terms import (
+    CALL,
+    LETTER,
+    MEAN,
+    NUMBER,
+    POWER,
+    PRODUCT,
+    SUM,
+    Node,
+    Path,
+    at,
+    changed,
+    difference,
+    letter,
+    letters,
+    mean,
+    number,
+    power,
+    product,
+    replaced,
+    total,
+    walk,
+    written,
+)
+from kfcourse.exercises.derivations.values import ENTIRE, Uncomputed, Values
+from kfcourse.laws import Array
+
+CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly
+MOST_TRIED = 30000  # changes
+COSTS = {  # what is named if several changes explain a line
+    "sign": 1.0,
+    "doubled": 1.05,
+    "letter": 1.1,
+    "moment": 1.25,
+    "power": 1.2,
+    "factor": 1.2,
+    "noise-forgotten": 1.22,
+    "noise-mean": 1.45,
+    "lost-factor": 1.3,
+    "extra": 1.4,
+    "function": 1.4,
+    "lost": 1.5,
+}
+NUMBERS = [  # in front of a term
+    Fraction(-1),
+    *(Fraction(p, q) for q in range(1, 7) for p in range(1, 7) if p != q and gcd(p, q) == 1),
+]
+POWERS = (1, 2, 3, 4, Fraction(1, 2), -1, -2)
+PROBES = Fraction(17, 60), Fraction(71, 60), Fraction(-49, 60)  # values of a node
+OF_THE_LINE_ABOVE = 1.0  # an addition to the cost
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A change that makes a line equal to the one above.
+
+    Attributes
+    ----------
+    kind : str
+        A key of `COSTS`.
+    path : tuple of int
+        Way from the root to what is changed, in the line; to the term of the line above if `above`.
+    name : str
+        The letter, the function or the noise concerned.
+    order : int
+        Of the moment.
+    lost : Node, optional
+        The term that is lost, of the line above.
+    above : bool
+        Whether the path is one of the line above: of the term that something else was made of.
+    """
+
+    kind: str
+    path: Path
+    name: str = ""
+    order: int = 0
+    lost: Node | None = None
+    above: bool = False
+
+
+def term_path(root: Node, path: Path) -> Path:
+    """The way to the term around a node: the nearest one that stands in a sum; the whole line if
+    none does."""
+    for length in range(len(path), 0, -1):
+        if at(root, path[: length - 1]).kind == SUM:
+            return path[:length]
+    return ()
+
+
+def named(root: Node, path: Path) -> Path:
+    """The way to what is named: the term around a node, or the function in it whose argument the
+    node is part of."""
+    functions = [
+        path[:length] for length in range(len(path)) if at(root, path[:length]).kind == CALL
+    ]
+    return max([term_path(root, path), *functions], key=len)
+
+
+def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
+    """The slips that explain a line best, at most two of different terms; none if no single change
+    does."""
+    if above.kind == LETTER and above.data in setting.meanings:  # opened, to see its terms
+        above = setting.meanings[above.data]
+    return _Search(setting, line, above).best()
+
+
+@dataclass
+class _Search:
+    setting: Setting
+    line: Node
+    above: Node
+    values: Values = field(init=False)
+
+    def __post_init__(self) -> None:
+        free, waiting = set(self.setting.law.letters), [self.line, self.above]
+        while waiting:
+            for name in letters(waiting.pop()) - free:
+                free.add(name)
+                if name in self.setting.meanings:
+                    waiting.append(self.setting.meanings[name])
+        self.pool = sorted(free)
+        self.letters = [name for name in self.pool if name not in self.setting.meanings]
+        both = [self.line, self.above]
+        self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
+        self.mine, self.theirs = (self.values.of(tree, keep=True) for tree in both)
+        logs = [np.log(np.abs(self.values.letter(name))) for name in self.letters]
+        self.inverse = np.linalg.pinv(np.array([np.ones(self.values.points), *logs]).T)
+        self.terms = [
+            (sign, term)
+            for _, node in walk(self.above)
+            if node.kind == SUM
+            for sign, term in zip(node.data, node.parts, strict=True)
+        ]
+
+    def best(self) -> list[Slip]:
+        """The cheapest that hold, one for each term."""
+        fitting = [
+            (cost + self._unlikely(slip), -len(slip.path), i, slip, tree)
+            for i, (cost, slip, tree) in enumerate(self.fitting())
+        ]
+        kept: list[tuple[float, Slip]] = []
+        for cost, _, _, slip, tree in sorted(fitting, key=lambda candidate: candidate[:3]):
+            if kept and cost > kept[0][0] + 1e-9:
+                break
+            place = self._place(slip)
+            # around a term that is named already
+            if any(self._place(other)[: len(place)] == place for _, other in kept):
+                continue
+            if self._equal(tree, self.line if slip.above or _of_noise(slip) else self.above):
+                kept.append((cost, slip))
+        slips = [slip for _, slip in kept]
+        if slips and slips[0].kind == "doubled":  # either of the two
+            return slips[-1:]
+        return slips if len(slips) <= 2 else []
+
+    def _place(self, slip: Slip) -> Path:
+        return term_path(self.above if slip.above else self.line, slip.path)
+
+    def fitting(self) -> Iterator[tuple[float, Slip, Node]]:
+        """Changes that give the right values: cost, slip, the changed tree."""
+        for name in [noise for noise in self.setting.law.noises if noise in letters(self.above)]:
+            for kind, value in (("noise-forgotten", 0), ("noise-mean", 1)):
+                tree = replaced(self.above, {name: number(value)})
+                if self._same(self.values.of(tree), self.mine):
+                    yield COSTS[kind], Slip(kind, (), name), tree
+        moments, count = list(self._moments()), 0
+        for wrong, right, _ in moments:
+            self.values.of(product(wrong, right), keep=True)
+        for root, other in ((self.line, False), (self.above, True)):
+            target = self.mine if other else self.theirs
+            for path, node in walk(root):
+                around = [at(root, path[:i]) for i in range(len(path))]
+                wanted = self._wanted(root, path, around, target)
+                changes = self._of_moments(path, node, around, moments, other)
+                if not other:
+                    changes = chain(changes, self._of_node(path, node, around, wanted))
+                for cost, slip, new in changes:
+                    count += 1
+                    if count > MOST_TRIED:
+                        return
+                    changed_, its = (
+                        (changed(root, path, new), target) if wanted is None else (new, wanted)
+                    )
+                    if self._same(self.values.of(changed_), its):
+                        tree = changed(root, path, new)
+                        if not self._nothing(tree, path, around, slip.kind):
+                            yield cost, slip, tree
+
+    def _nothing(self, tree: Node, path: Path, around: list[Node], kind: str) -> bool:
+        """Whether a change leaves nothing of the mean or the power around it: then that does not
+        belong there as a whole.
+
+        With a noise that was lost a mean may be zero, and rightly so.
+        """
+        for i, outer_ in enumerate(around):
+            if outer_.kind in (MEAN, CALL, POWER):
+                outer = at(tree, path[:i])
+                left = self.values.of(outer.parts[0] if kind == "lost-factor" else outer)
+                return bool(np.all(np.abs(left) <= 1e-9))
+        return False
+
+    def _wanted(self, root: Node, path: Path, around: list[Node], target: Array) -> Array | None:
+        """What the value of a node should be; None inside a power, a function or a mean.
+
+        Outside of them the line is (a + b t)/(c + d t), t the value: four of such values have one
+        cross-ratio with those of t.
+        """
+        if any(outer.kind not in (SUM, PRODUCT) for outer in around):
+            return None
+        p, q, r = PROBES
+        first, second, third = (
+            self.values.of(changed(root, path, number(probe))) for probe in PROBES
+        )
+        with np.errstate(all="ignore"):
+            ratio = (target - first) * (second - third) / (target - third) / (second - first)
+            ratio = ratio * float((q - p) / (q - r))
+            wanted = (float(p) - ratio * float(r)) / (1 - ratio)
+        return wanted if np.isfinite(wanted).all() else None
+
+    def _of_moments(
+        self, path: Path, node: Node, around: list[Node], moments: list[Any], other: bool
+    ) -> Iterator[tuple[float, Slip, Node]]:
+        """A moment in the place of another; of the line above, the other way round."""
+        if not around or around[-1].kind in (SUM, POWER):
+            for wrong, right, order in moments:
+                pair = (wrong, right) if other else (right, wrong)
+                slip = Slip("moment", path, order=order, above=other)
+                cost = COSTS["moment"] + OF_THE_LINE_ABOVE * other
+                yield cost, slip, product(node, *pair, exponents=(1, 1, -1))
+
+    def _of_node(
+        self, path: Path, node: Node, around: list[Node], wanted: Array | None
+    ) -> Iterator[tuple[float, Slip, Node]]:
+        """Changes of one node of the line: cost, slip, the new node."""
+        parts, data = node.parts, node.data
+        outer = around[-1].kind if around else ""
+        beside = bool(around) and len(around[-1].parts) > 1
+
+        def slip(
+            kind: str,
+            new: Node,
+            name: str = "",
+            below: Path = (),
+            more: float = 0,
+            lost: Any = None,
+        ) -> tuple[float, Slip, Node]:
+            return COSTS[kind] + more, Slip(kind, path + below, name, lost=lost), new
+
+        if node.kind == SUM:
+            for i, part in enumerate(parts):
+                signs = tuple(-s if i == j else s for j, s in enumerate(data))
+                yield slip("sign", Node(SUM, parts, signs), below=(i,))
+                value = data[i] * self.values.of(part)
+                twice = any(
+                    j != i and self._same(data[j] * self.values.of(other), value)
+                    for j, other in enumerate(parts)
+                )
+                gone = Node(SUM, (*parts[:i], number(0), *parts[i + 1 :]), data)
+                if len(parts) > 1:
+                    yield slip("doubled" if twice else "extra", gone, below=(i,))
+        if node.kind == LETTER:
+            yield from (slip("letter", letter(name), data) for name in self.pool if name != data)
+        base, own = (parts[0], data) if node.kind == POWER else (node, 1)
+        if base.kind != NUMBER:
+            name = base.data if base.kind == LETTER else ""
+            yield from (slip("power", power(base, k), name) for k in POWERS if k != own)
+        if node.kind == CALL:
+            yield from (slip("function", Node(CALL, parts, name), data) for name in ENTIRE)
+        if node.kind == PRODUCT:
+            for i, part in enumerate(parts):
+                name = part.data if part.kind == LETTER else ""
+                rest = Node(PRODUCT, (*parts[:i], number(1), *parts[i + 1 :]), data)
+                yield slip("extra", rest, name, below=(i,))
+        if outer != PRODUCT:
+            for q in NUMBERS:
+                kind, new = "sign" if q == -1 else "factor", product(number(q), node)
+                yield slip(kind, new, more=0.35 * (node.kind == LETTER and beside))
+            for name in self.pool:
+                for k in (1, 2):
+                    yield slip("lost-factor", product(power(letter(name), k), node), name)
+        if outer != SUM:
+            for _, term in self.terms:
+                for lost in (term, mean(term)):
+                    for sign in (1, -1):
+                        yield slip("lost", total(node, lost, signs=(1, sign)), lost=term)
+            if wanted is not None:
+                for q, powers in self._monomial(wanted - self.values.of(node)):
+                    factors = [power(letter(name), k) for name, k in powers.items()]
+                    # in the sum where least is lost
+                    more = 0.02 * sum(map(abs, powers.values())) + 0.1 * (node.kind != SUM)
+                    new = total(node, product(number(q), *factors))
+                    yield slip("lost", new, " and ".join(powers), more=more)
+
+    def _monomial(self, values: Array) -> Iterator[tuple[Fraction, dict[str, int]]]:
+        """q and powers of letters of which these may be the values."""
+        with np.errstate(all="ignore"):
+            exponents = (self.inverse @ np.log(np.abs(values)))[1:]
+            if np.abs(exponents).max(initial=0) <= 12:
+                powers = {
+                    n: int(k) for n, k in zip(self.letters, np.round(exponents), strict=True) if k
+                }
+                for name, k in powers.items():
+                    values = values / self.values.letter(name) ** float(k)
+                if q := Fraction(float(np.median(values))).limit_denominator(60):
+                    yield q, powers
+
+    def _moments(self) -> Iterator[tuple[Node, Node, int]]:
+        """Wrong and right moments of the normal law, and their order; of functions, too."""
+        law = self.setting.law
+        at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
+        products: dict[str, list[Node]] = {}
+        for _, node in [*walk(self.line), *walk(self.above)]:
+            if node.kind == CALL and node.data in ENTIRE and letters(node) & set(law.states):
+                there = replaced(node, at_mean)
+                yield there, mean(node), 0
+                yield power(there, 2), mean(power(node, 2)), 0
+            if node.kind == MEAN:
+                (inside,) = node.parts
+                for term in inside.parts if inside.kind == SUM else (inside,):
+                    products[written(term)] = self._factors(term)
+        for factors in products.values():
+            for i in range(1, len(factors)):
+                apart = (mean(product(*part)) for part in (factors[:i], factors[i:]))
+                yield product(*apart), mean(product(*factors)), 0
+        for i, x in enumerate(law.states):
+            m, d, moment = letter(law.means[i]), letter(law.cov[i][i]), mean(power(letter(x), 2))
+            for k in range(2, 9):
+                raw, central = (
+                    mean(power(base, k)) for base in (letter(x), difference(letter(x), m))
+                )
+                yield power(m, k), raw, k
+                if k % 2 == 0:
+                    square, own = (power(base, Fraction(k, 2)) for base in (moment, d))
+                    yield central, raw, k
+                    yield raw, central, k
+                    yield product(number(prod(range(1, k, 2))), square), raw, k
+                    yield own, central, k
+                    yield own, raw, k
+                if k == 4:
+                    yield raw, difference(raw, power(moment, 2)), k
+
+    def _factors(self, node: Node) -> list[Node]:
+        """Those that depend on the state, x^3 as three of them."""
+        if node.kind == PRODUCT:
+            return [factor for part in node.parts for factor in self._factors(part)]
+        if node.kind == POWER and node.data in range(2, 9):
+            return self._factors(node.parts[0]) * int(node.data)
+        return [node] * bool(letters(node) & set(self.setting.law.states))
+
+    def _unlikely(self, slip: Slip) -> float:
+        """An addition to the cost of changing a term that is nothing, or that stands in the line
+        above as it is."""
+        if slip.above or _of_noise(slip) or slip.kind in ("doubled", "extra", "lost"):
+            return 0.0
+        path = term_path(self.line, slip.path)
+        value = self.values.of(at(self.line, path))
+        if path:
+            value = value * at(self.line, path[:-1]).data[path[-1]]
+        stays = path and any(
+            self._same(value, sign * self.values.of(term)) for sign, term in self.terms
+        )
+        return 0.35 if stays or np.all(np.abs(value) <= 1e-10) else 0.0
+
+    def _equal(self, first: Node, second: Node) -> bool:
+        try:
+            return compare(self.setting, first, second) == EQUAL
+        except Uncomputed:  # with the change a mean would be of something that is not computed
+            return False
+
+    def _same(self, a: Array, b: Array) -> bool:
+        with np.errstate(all="ignore"):
+            return bool(np.all(np.abs(a - b) <= CLOSE * (np.abs(a) + np.abs(b)) + 1e-14))
+
+
+def _of_noise(slip: Slip) -> bool:
+    return slip.kind.startswith("noise")

@@ -1,0 +1,156 @@
+"""Grades: one JSON line a notebook, written as soon as it is graded; from the lines a table for
+spreadsheets is made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from kfcourse.exercises.checks import Question, sets
+from kfcourse.exercises.checks.hints import OF_RESULT
+from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WRONG
+from kfcourse.exercises.notebooks.texts import write_csv
+from kfcourse.files import save
+
+# of an answer: an error before it; the grader could not compare it
+NOT_RUN, NOT_GRADED = "not run", "not graded"
+GRADED, PARTLY, OTHER, FAILED = "graded", "graded in part", "not an exercise notebook", "not graded"
+SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–", NOT_GRADED: "?"}
+
+
+@dataclass(frozen=True)
+class Comment:
+    """What was said of an answer.
+
+    Attributes
+    ----------
+    says : str
+    mistakes : tuple of str
+        Their names.
+    share : float
+        Of its results that are right.
+    follows : tuple of str
+        The earlier questions on whose wrong answers it is right.
+    """
+
+    says: str
+    mistakes: tuple[str, ...] = ()
+    share: float = 0.0
+    follows: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Grade:
+    """What came of a notebook.
+
+    Attributes
+    ----------
+    name : str
+        Its path in the folder.
+    status : {"graded", "graded in part", "not an exercise notebook", "not graded"}
+        In part, if an answer could not be compared for no fault of its own that is known.
+    letter, variant : str
+        The set as the notebook claims, the variant by which it was marked.
+    marks : dict
+        Question to "passed", "wrong", "unusable", "not implemented", "not run" or "not graded".
+    notes : tuple of str
+        Where it stopped, what the wrong answers look like.
+    looks : tuple of str
+        What a lecturer should look at.
+    digest : str
+        Empty if it was not graded, or in part: it is tried again.
+    comments : dict
+        Question to what was said of the answer.
+    student : str
+        Whom the notebook was handed out to, as it says itself.
+    work : str
+        Hash of the student's code, empty if there is none: the same code has the same.
+    """
+
+    name: str
+    status: str
+    letter: str = ""
+    variant: str = ""
+    marks: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    looks: tuple[str, ...] = ()
+    digest: str = ""
+    comments: Mapping[str, Comment] = field(default_factory=dict)
+    student: str = ""
+    work: str = ""
+
+    @property
+    def passed(self) -> int:
+        return sum(mark == PASSED for mark in self.marks.values())
+
+    @property
+    def note(self) -> str:
+        """All notes in a line."""
+        return "; ".join([*self.notes, *(f"look: {look}" for look in self.looks)])
+
+
+def in_words(question: Question, name: str) -> str:
+    """What is said of a known mistake, or of what is known of any result; of others the name tells
+    it."""
+    says = {code: sentence for code, sentence, _ in OF_RESULT}
+    says |= {mistake.name: mistake.says for mistake in question.mistakes}
+    says["follows"] = "right on top of an earlier wrong answer"
+    return says.get(name, name.replace("-", " ")).partition(". ")[0].rstrip(".")
+
+
+def line(grade: Grade) -> str:
+    """The grade as a line of JSON."""
+    return json.dumps(asdict(grade)) + "\n"
+
+
+def read_lines(path: Path) -> dict[str, Grade]:
+    """Grades of an earlier run, by digest; none if there is no file, nor of a line that was cut."""
+    grades = {}
+    with suppress(FileNotFoundError):
+        for text in path.read_text(encoding="utf-8").splitlines():
+            with suppress(ValueError, TypeError, LookupError, AttributeError):
+                fields = json.loads(text)
+                fields["comments"] = {
+                    name: Comment(**_tuples(parts)) for name, parts in fields["comments"].items()
+                }
+                if fields["digest"]:
+                    grades[fields["digest"]] = Grade(**_tuples(fields))
+    return grades
+
+
+def _tuples(fields: Mapping) -> dict:
+    return {
+        name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
+    }
+
+
+def write_lines(grades: Iterable[Grade], path: Path) -> None:
+    """Write the lines of all grades, completely or not at all."""
+    save("".join(map(line, grades)), path)
+
+
+def write_table(grades: Iterable[Grade], path: Path) -> None:
+    """Write a row for each grade as CSV that spreadsheets open, completely or not at all."""
+    questions = [f"q{i + 1}" for i in range(max(len(set_.questions) for set_ in sets().values()))]
+    columns = [
+        "notebook",
+        "status",
+        "set",
+        "variant",
+        *questions,
+        "passed",
+        "of",
+        "note",
+        "student",
+    ]
+    rows = []
+    for grade in sorted(grades, key=lambda grade: grade.name):
+        passed, of = (grade.passed, len(grade.marks)) if grade.marks else ("", "")
+        marks = [*grade.marks.values(), *[""] * (len(questions) - len(grade.marks))]
+        head = [grade.name, grade.status, grade.letter, grade.variant]
+        row = [*head, *marks, passed, of, grade.note, grade.student]
+        rows.append(dict(zip(columns, row, strict=True)))
+    write_csv(columns, rows, path)

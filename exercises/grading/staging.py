@@ -1,0 +1,114 @@
+"""The package as a returned notebook sees it: a copy without the right answers, and personal
+numbers in their place."""
+
+from __future__ import annotations
+
+import compileall
+import shutil
+from importlib import resources
+from pathlib import Path
+
+from kfcourse.exercises.checks import Exercise, sets
+
+LEFT_OUT = "cli.py", "__main__.py", "exercises"  # what a student's notebook has no use for
+# What it needs of the exercises.
+NEEDED = (
+    "__init__.py",
+    "checks/*.py",
+    "derivations/*.py",
+    *(f"grading/{name}.py" for name in ("__init__", "channel", "session", "values")),
+)
+ANSWERS = "derivations/worked.py"  # writes right derivations
+EXERCISES = "kfcourse.exercises"
+FONTS = "fonts"  # on the stage: those that matplotlib has found
+COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
+
+REGISTRY = '''"""The exercise sets without their questions: what a notebook is graded with."""
+
+from pathlib import Path
+
+from kfcourse.exercises.checks.registry import ExerciseSet, register
+
+NUMBERS = {}  # "letter variant" to personal numbers
+
+
+def _numbers(task):
+    try:
+        return dict(NUMBERS[f"{task.letter} {task.variant.name}"])
+    except KeyError:
+        name = f"set {task.letter}, variant {task.variant.name}"
+        raise ValueError(f"personal numbers of {name} are not yours") from None
+
+
+for _letter, _title, _name, _about, _angles in {rows!r}:
+    _folder = Path(__file__).parent / _name
+    register(
+        ExerciseSet(
+            _letter, _title, _folder, (), numbers=_numbers, about_variant=_about, angles=_angles
+        )
+    )
+'''
+
+
+def stage(folder: Path) -> Path:
+    """Write the package into a folder for graded notebooks: a copy without keys, questions,
+    mistakes and masters.
+
+    Only that copy is on the path where a returned notebook runs.
+
+    Returns
+    -------
+    Path
+        What belongs on the path.
+    """
+    own, machinery = (Path(str(resources.files(name))) for name in ("kfcourse", EXERCISES))
+    target = folder / "kfcourse"
+    try:
+        shutil.copytree(own, target, ignore=lambda at, names: LEFT_OUT if Path(at) == own else ())
+    except shutil.Error as errors:  # a list of all
+        raise OSError(f"the package cannot be copied to {folder}: {errors.args[0][0][2]}") from None
+    registered = list(sets().values())
+    needed = {
+        target / "exercises" / path.relative_to(machinery): path
+        for pattern in NEEDED
+        for path in machinery.glob(pattern)
+        if path != machinery / ANSWERS
+    } | {
+        target / "exercises" / "sets" / set_.folder.name / COMPANIONS: set_.folder / COMPANIONS
+        for set_ in registered
+        if (set_.folder / COMPANIONS).exists()
+    }
+    for copied, path in needed.items():
+        copied.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(path, copied)
+    rows = [
+        (set_.letter, set_.title, set_.folder.name, set_.about_variant, set_.angles)
+        for set_ in registered
+    ]
+    (target / "exercises" / "sets" / "__init__.py").write_text(
+        REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8"
+    )
+    compileall.compile_dir(target, quiet=2)
+    (folder / FONTS).mkdir()
+    # otherwise each process searches for fonts again
+    for path in _cache_of_matplotlib().glob("fontlist*.json"):
+        shutil.copy(path, folder / FONTS)
+    return folder
+
+
+def _cache_of_matplotlib() -> Path:
+    import matplotlib  # a tenth of the start of a grading process, which stages nothing
+
+    return Path(matplotlib.get_cachedir())
+
+
+def answers() -> list[Path]:
+    """Folders that hold the right answers: no notebook may read them."""
+    return sorted(
+        {set_.folder.parent for set_ in sets().values()} | {Path(str(resources.files(EXERCISES)))}
+    )
+
+
+def personal_numbers(own: Exercise) -> dict[str, dict[str, float]]:
+    """Personal numbers of an exercise by "letter variant": what a notebook is given of it."""
+    return {f"{own.letter} {own.variant.name}": own.numbers}

@@ -1,0 +1,186 @@
+"""A variant for each student of a course list, always the same."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from kfcourse.exercises.notebooks.texts import clean, plain, safe, write_csv
+
+LONGEST = 100  # characters of a name: it becomes the name of a folder
+
+
+class Student(NamedTuple):
+    """A line of the course list: name and group; what an assignment adds: the variant given, the
+    sets handed out."""
+
+    name: str
+    group: str
+    variant: str
+    sets: str = ""
+
+    @property
+    def folder(self) -> Path:
+        """Of the student's notebooks, in the folder of all."""
+        return Path(safe(self.group), safe(self.name))
+
+
+def assign(path: Path, variants: Sequence[str]) -> list[Student]:
+    """Give each student of a course list a variant, always the same.
+
+    Every pair of student and variant has a score, a hash of their names.  Students, in the order of
+    the file, take the free variant of their group with the highest score; when all are taken, a
+    second round begins.  Students added at the end of the file change nothing for those before.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with the columns name and group.
+    variants : sequence of str
+
+    Raises
+    ------
+    ValueError
+        The file is missing, is not such a table, or names a student twice; says which line.
+    """
+    taken: dict[str, list[str]] = {}
+    students: list[Student] = []
+    for _, row in _distinct(path):
+        used = taken.setdefault(row.group, [])
+        if len(used) == len(variants):
+            used.clear()
+        free = [variant for variant in variants if variant not in used]
+        best = max(
+            free,
+            key=lambda variant: hashlib.sha256(
+                f"{row.name}/{row.group}/{variant}".encode()
+            ).digest(),
+        )
+        used.append(best)
+        students.append(Student(row.name, row.group, best))
+    return students
+
+
+def save_assignment(students: Iterable[Student], path: Path) -> None:
+    """Write who has which variant, and which sets: `read_assignment` reads it."""
+    write_csv(Student._fields, (student._asdict() for student in students), path)
+
+
+def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
+    """The students of a saved assignment; of a course list without variants, as `assign` gives
+    them.
+
+    Raises
+    ------
+    ValueError
+        As `assign`; or a variant is missing in some lines only.
+    """
+    rows = list(_distinct(path))
+    if not any(row.variant for _, row in rows):
+        return assign(path, variants)
+    for line, row in rows:
+        if not row.variant:
+            raise ValueError(f"{path}, line {line}: {row.name} has no variant, and others have")
+    return [row for _, row in rows]
+
+
+def _distinct(path: Path) -> Iterator[tuple[int, Student]]:
+    """The lines of a course list with their numbers; ValueError if two students would share a
+    folder, or there is none."""
+    seen: dict[str, tuple[int, Student]] = {}
+    for line, row in read_course_list(path):
+        folder = row.folder.as_posix()
+        number, other = seen.setdefault(folder.casefold(), (line, row))
+        if other is row:
+            yield line, row
+        elif (other.name, other.group) == (row.name, row.group):
+            raise ValueError(
+                f"{path}, line {line}: {row.name}, {row.group} stands there twice; add a "
+                f"middle name"
+            )
+        else:
+            raise ValueError(
+                f"{path}, line {line}: the folder of {row.name}, {row.group} would be "
+                f"{folder}, as that of {other.name}, "
+                f"{other.group} in line {number} (some systems take large and small letters "
+                f"for the same); change one name"
+            )
+    if not seen:
+        raise ValueError(f"{path} names no student")
+
+
+def read_course_list(path: Path) -> Iterator[tuple[int, Student]]:
+    """Every student in a CSV file with the columns name and group; an assignment has variant and
+    sets, too."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise ValueError(
+            f"no course list {path}; it is a CSV file with the columns name and group"
+        ) from None
+    except (IsADirectoryError, PermissionError) as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
+    first = text.partition("\n")[0]
+    delimiter = max(",;\t", key=first.count)
+    reader = csv.DictReader(
+        io.StringIO(text), delimiter=delimiter, skipinitialspace=True, strict=True
+    )
+    line = 1
+    try:
+        columns = [(column or "").strip().lower() for column in reader.fieldnames or []]
+        if not {"name", "group"} <= set(columns):
+            raise ValueError(
+                f"{path}: the first line must name the columns name and group, got "
+                f"{', '.join(columns) or 'nothing'}"
+            )
+        reader.fieldnames = columns
+        for values in reader:
+            line, before = reader.line_num, line
+            yield from _row(path, before + 1, values)
+    except csv.Error as error:
+        quoted = (
+            "; is a quote opened and not closed?"
+            if "data" in str(error) or "expected" in str(error)
+            else ""
+        )
+        raise ValueError(f"{path}, line {line + 1}: {error}{quoted}") from None
+
+
+def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[tuple[int, Student]]:
+    """The row, or none of an empty line; ValueError if it cannot be right."""
+    where = f"{path}, line {line}"
+    if any("\n" in str(value) for value in values.values()):
+        raise ValueError(
+            f"{where}: a quote is opened and not closed on the line; remove it, or write it twice"
+        )
+    fields = {key: plain((values.get(key) or "").strip()) for key in Student._fields}
+    if any(str(value).strip() for value in values.get(None) or []):
+        raise ValueError(
+            f"{where}: more values than columns; put a name that has a comma in it into quotes"
+        )
+    if not fields["name"] and not fields["group"]:
+        return
+    for key, of in (("name", "a student"), ("group", fields["name"])):
+        if not re.search(r"\w", fields[key]):
+            raise ValueError(
+                f"{where}: {of} without a {key}"
+                + (f" (got {fields[key]!r})" if fields[key] else "")
+            )
+        if len(fields[key]) > LONGEST:
+            raise ValueError(
+                f"{where}: a {key} of more than {LONGEST} characters; is a quote or a line break "
+                f"missing?"
+            )
+    for key, value in fields.items():
+        if clean(value, len(value)) != " ".join(value.split()):
+            raise ValueError(
+                f"{where}: a {key} with characters that cannot be seen, {value!r}; type it anew"
+            )
+    yield line, Student(**fields)

@@ -1,0 +1,58 @@
+"""The exercise notebooks in nbgrader's format: solutions between its markers, and check cells that
+are worth points."""
+
+from __future__ import annotations
+
+import re
+
+import nbformat
+from nbformat import NotebookNode
+
+from kfcourse.exercises.checks import sets
+from kfcourse.exercises.checks.question import WEIGHTS
+from kfcourse.exercises.notebooks.master import BEGIN, without_solution
+
+SCHEMA = 3  # version of nbgrader's metadata
+CHECK = re.compile(r"""^(\w+\.check\(\s*["'](\w+)["'].*\))\s*$""")
+
+
+def source_notebook(notebook: NotebookNode) -> NotebookNode:
+    """What nbgrader calls a source notebook, from the complete one of `render`.
+
+    The masters mark solutions as nbgrader does.  An answer's cell becomes a solution cell; a
+    check's cell a locked test, which fails if the answer is wrong and says what kind of mistake it
+    looks like.  Solutions in texts are left out.
+    """
+    result = nbformat.from_dict(notebook)
+    levels = {
+        question.name: question.level
+        for question in sets()[notebook.metadata["kfcourse"]["set"]].questions
+    }
+    for cell in result.cells:
+        asked = CHECK.match(cell.source) if cell.cell_type == "code" else None
+        if cell.cell_type != "code":
+            cell.source = without_solution(cell.source, code=False)
+        elif asked:
+            call, question = asked.groups()
+            cell.source = f"result = {call}\nassert result.passed, result"
+            cell.metadata["nbgrader"] = _marked(question, grade=True, locked=True) | {
+                "points": WEIGHTS[levels[question]]
+            }
+        elif BEGIN in cell.source and not without_solution(cell.source, code=True):
+            cell.source = ""  # an answer in words
+        elif BEGIN in cell.source:
+            cell.metadata["nbgrader"] = _marked(f"{cell.id}-answer", solution=True)
+    result.cells = [cell for cell in result.cells if cell.source.strip()]
+    return result
+
+
+def _marked(name: str, grade: bool = False, solution: bool = False, locked: bool = False) -> dict:
+    """nbgrader's metadata of a cell."""
+    return {
+        "grade_id": name,
+        "schema_version": SCHEMA,
+        "grade": grade,
+        "solution": solution,
+        "locked": locked,
+        "task": False,
+    }

@@ -1,0 +1,191 @@
+"""Keys of sets f, g, h, j, l, o, p against independent references: the package's filters,
+derivatives, an integrator."""
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from kfcourse import Model, gaussian, linearised, predictions, run, simulate
+from kfcourse.continuous import ContinuousModel, steady_state
+from kfcourse.exercises.checks import exercise
+from kfcourse.exercises.sets.f_exact import companion
+from kfcourse.exercises.sets.f_exact import keys as grid
+from kfcourse.exercises.sets.g_extended import keys as extended
+from kfcourse.exercises.sets.g_extended.companion import linearisation
+from kfcourse.exercises.sets.g_extended.hidden import hidden_functions
+from kfcourse.exercises.sets.h_continuous import keys as continuous_time
+from kfcourse.exercises.sets.h_continuous import questions as continuous_questions
+from kfcourse.exercises.sets.o_modes import keys as modes
+from kfcourse.exercises.sets.o_modes import questions as modes_questions
+from kfcourse.exercises.sets.p_find_the_slip import keys as slips
+from kfcourse.filters import alphabeta, aof, kalman_filter, logic_dynamic
+from kfcourse.lab.variants import find_variant, load_variants
+from kfcourse.laws import Gaussian
+from kfcourse.linear.consistency import innovations, nees, nis
+from kfcourse.scenarios.navigation import Dynamics, Observation, Sensor, fuse
+from kfcourse.symbolic.moments import GaussianMoments
+
+
+def test_the_grid_is_the_kalman_filter_on_a_linear_model():
+    model = Model.define(
+        "c*x + e*v",
+        "g*x + f*w",
+        dict(c=0.8, e=0.6, g=1.7, f=0.7),
+        prior=dict(mean=0.4, variance=1.3),
+    )
+    y = simulate(model, 1, 9, seed=3).y
+    y[4] = np.nan
+    x = np.linspace(-9, 9, 700)
+    prior = grid.normal(x, 0.4, 1.3)
+    z, p, total = grid.run_filter(y[:, 0, 0], x, prior, *companion.laws(model))
+    law, before = run(kalman_filter(model), y), predictions(kalman_filter(model), y)
+    # step 0.026, narrowest density 0.4: the rule's error is below rounding (formula of the
+    # chapter); 8 steps of rounding
+    np.testing.assert_allclose(z, law.mean[:, 0, 0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(p, law.cov[:, 0, 0, 0], rtol=1e-11)
+    F = 1.7**2 * before.cov[:, 0, 0, 0] + 0.49
+    logs = -0.5 * ((y[:, 0, 0] - 1.7 * before.mean[:, 0, 0]) ** 2 / F + np.log(2 * np.pi * F))
+    assert total == pytest.approx(np.nansum(logs), abs=1e-11)
+
+
+@pytest.mark.parametrize("name", sorted(load_variants()))
+def test_the_extended_filter_is_the_package_s(name):
+    model = find_variant(name).model
+    x, y = simulate(model, 5, 8, seed=2)
+    lin = linearised(model)
+    functions = linearisation(model)
+    mean, cov = model.prior.mean + 0.3 * np.sqrt(np.diagonal(model.prior.cov)), model.prior.cov
+    shifted = replace(model, prior=Gaussian(mean, cov))
+    z, p, lam, Psi = extended.run_filter(y, mean, cov, *functions)
+    ekf = aof(linearised(shifted))
+    law, before = run(ekf, y), predictions(ekf, y)
+    for mine, theirs in ((z, law.mean), (p, law.cov), (lam, before.mean), (Psi, before.cov)):
+        np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
+    theirs = extended.consistency(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
+    np.testing.assert_allclose(theirs[0], nees(x, law).mean(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(
+        theirs[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6
+    )
+
+
+def test_hidden_jacobians_are_derivatives():
+    for n, r, p in ((3, 3, 2), (1, 1, 1), (2, 1, 2)):
+        hidden = hidden_functions(exercise("g", "53"), "test", n, r, p)
+        x = np.random.default_rng(1).normal(size=(4, n))
+        for function, jacobian in ((hidden.f, hidden.Phi), (hidden.S, hidden.H)):
+            # third derivatives of order one: error of the order step^2
+            np.testing.assert_allclose(extended.jacobian(function, x, 1e-4), jacobian(x), atol=1e-7)
+        assert np.linalg.eigvalsh(hidden.D_n(x)).min() > 0
+
+
+def riccati(t, D, a, s, h, S_xi, N):
+    return -2 * a * D + s * s * S_xi / 2 - 2 * h * h / N * D**2
+
+
+def test_continuous_numbers():
+    assert continuous_time.noise_variances(3.0, 0.4, 0.05) == (pytest.approx(30), pytest.approx(4))
+    for arguments in continuous_questions.steady_arguments(exercise("h", "7")):
+        D, K = continuous_time.steady_state(*arguments)
+        a, s, h, S_xi, N = arguments
+        letters = {"a": a, "s": s, "h": h}
+        model = ContinuousModel.define(
+            "-a*x", "s", "h*x", letters, spectral_density=S_xi, noise_density=N
+        )
+        assert tuple(pytest.approx(matrix.item()) for matrix in steady_state(model)) == (D, K)
+        scalar = [np.array([[v]]) for v in (D, -a, s, h, S_xi, N)]
+        assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
+        late = solve_ivp(riccati, (0, 60), [3.0], args=tuple(arguments), rtol=1e-10, atol=1e-12)
+        assert late.y[0, -1] == pytest.approx(float(D), rel=1e-6)
+
+
+@pytest.mark.parametrize("variant", ["53", "21"])
+def test_two_steps_of_modes_are_the_package_s_filter(variant):
+    for y, m, d, a, q, C, pi, first in modes_questions.two_measurements(exercise("o", variant)):
+        models = [
+            Model.define(
+                "a*x + s*v",
+                "x + C*w",
+                {"a": a, "s": np.sqrt(q), "C": c},
+                prior={"mean": m, "variance": d},
+            )
+            for c in C
+        ]
+        filter_ = logic_dynamic([gaussian(model) for model in models], pi, first)
+        before = filter_.step(filter_.init(1), y[:1, None])
+        after = filter_.step(before, y[1:, None])
+        theirs = modes.two_steps(y, m, d, a, q, C, pi, first)
+        np.testing.assert_allclose(
+            theirs, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12
+        )
+
+
+# -- keys that are formulas: the package has them otherwise
+
+
+def asked(letter, name):
+    """Key and hidden arguments of a question."""
+    task = exercise(letter, "21")
+    question = task.questions[name]
+    return question.key, question.arguments(task)
+
+
+def test_the_alpha_beta_filter_and_its_gains_are_the_package_s():
+    key, calls = asked("j", "j4")
+    for y, T, alpha, beta, r, v in calls:
+        # the same filter as a linear system: x' = A (I - K H) x + A K y on each axis
+        A, K, H = np.array([[1, T], [0, 1]]), np.array([[alpha], [beta / T]]), np.eye(1, 2)
+        out = control.ss(A @ (np.eye(2) - K @ H), A @ K, np.eye(2) - K @ H, K, T)
+        positions, velocities = key(y, T, alpha, beta, r, v)
+        for run_, axis in np.ndindex(y.shape[1:]):
+            start = [np.broadcast_to(part, y.shape[1:])[run_, axis] for part in (r, v)]
+            expected = control.forced_response(out, U=y[:, run_, axis], X0=start).outputs
+            np.testing.assert_allclose(positions[:, run_, axis], expected[0], rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(velocities[:, run_, axis], expected[1], rtol=1e-9, atol=1e-9)
+    key, calls = asked("j", "j3")
+    for (alpha,) in calls:
+        assert key(alpha) == pytest.approx(
+            (alphabeta.steady_beta(alpha), alphabeta.tracking_index(alpha))
+        )
+
+
+def test_late_measurements_are_fused_as_by_the_package():
+    key, calls = asked("l", "l5")
+    for tags, arrivals, values, m, P, q, r, now in calls:
+        sensor = Sensor.define("receiver", ["s", "V"], "s + w", variance=r, period=1.0)
+        rows = zip(tags, arrivals, values, strict=True)
+        seen = [
+            Observation("receiver", float(tag), float(at), np.array([[value]]))
+            for tag, at, value in rows
+        ]
+        vehicle = Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
+        law = fuse(vehicle, [sensor], Gaussian(m, P), seen, np.array([now]))
+        mean, cov = key(tags, arrivals, values, m, P, q, r, now)
+        np.testing.assert_allclose(mean, law.mean[0, 0], rtol=1e-9)
+        np.testing.assert_allclose(cov, law.cov[0, 0], rtol=1e-9)
+
+
+def test_formulas_without_a_slip_are_moments_of_the_package():
+    x1, x2, v, w1, w2, a, q, G, gamma, r = sp.symbols("x1 x2 v w1 w2 a q G gamma r", real=True)
+    m1, m2, d11, d12, d22 = law = sp.symbols("m1 m2 d11 d12 d22", real=True)
+    root = sp.Symbol("root", positive=True)
+    pair = GaussianMoments(
+        [x1, x2, v, w1, w2],
+        [m1, m2, 0, 0, 0],
+        sp.diag(sp.Matrix([[d11, d12], [d12, d22]]), 1, 1, r),
+    )
+    square = pair.mean_of(sp.expand((a * x1 + root * v) ** 2)).subs(root, sp.sqrt(q))
+    assert sp.simplify(slips.second_moment(a, q, m1, d11) - square) == 0
+    y = gamma * (G * x1 + w2)
+    assert sp.simplify(slips.scaled_meter(gamma, G, d11, r) - pair.covariance(y, y)) == 0
+    assert sp.simplify(slips.noise_intensity(*law) - pair.mean_of(x1**2)) == 0
+    meters = (x1**2 + v, x2 + w1)
+    F = sp.Matrix(2, 2, lambda i, j: pair.covariance(meters[i], meters[j]))
+    assert sp.simplify(slips.meter_variance(*law) - F) == sp.zeros(2, 2)
+    E, kappa = sp.symbols("E kappa", real=True)
+    forces = E * (sp.cos(x2) - kappa * sp.sin(x2)), E * (sp.sin(x2) + kappa * sp.cos(x2))
+    for slope, force in zip(slips.by_angle(E, kappa, x2), forces, strict=True):
+        assert sp.simplify(slope - force.diff(x2)) == 0
