@@ -205,7 +205,7 @@ ROOMS = {
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
     "kfcourse/continuous": 10_490,
-    "kfcourse/filters": 33_850,
+    "kfcourse/filters": 32_810,
     "kfcourse/lab": 19_500,
     "kfcourse/linear": 6_750,
     "kfcourse/montecarlo": 11_270,

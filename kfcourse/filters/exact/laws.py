@@ -6,9 +6,9 @@ address.
     law(which, points, y, c, x, mean, deviation)
 
 fills mean and deviation at so many states x.  `which` is 2 j for the next state in mode j, 2 j + 1
-for the measurement y, and -1 - (i J + j) for the probability, in the place of a mean, of a
-transition that depends on the state.  Parameters are read from c: the same formulas with other
-numbers are compiled once.
+for the measurement y, 2 J for the first state, and -1 - (i J + j) for the probability, in the place
+of a mean, of a transition that depends on the state.  Parameters are read from c: the same formulas
+with other numbers are compiled once.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from kfcourse.laws import Array
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
+SHARPEST = 1e-7  # deviation of a prior without variance, in units of its mean, or of 1
 HEADER = '''"""Printed by kfcourse.filters.exact.laws; it may be removed at any time."""
 
 from math import *
@@ -40,8 +41,6 @@ from math import *
 from numba import cfunc
 
 VALUES = "float64[::1]"
-
-
 SIGNATURE = "void(int64, int64, float64, {0}, {0}, {0}, {0})".format(VALUES)
 
 
@@ -56,17 +55,20 @@ def modes_of(model: Model | JumpModel) -> Sequence[Model]:
 
 
 def constants(model: Model | JumpModel, k: int) -> Array:
-    """The array c of step k: of each mode its parameters and what is known of the step, then the
-    chain's."""
-    parts = [[*map(float, mode.values.values()), *mode.known.at(k)] for mode in modes_of(model)]
+    """The array c of step k: the prior's mean and deviation, of each mode its parameters and what
+    is known of the step, then the chain's."""
+    (mean,), ((variance,),) = model.prior
+    parts = [[mean, max(np.sqrt(variance), SHARPEST * max(abs(mean), 1.0))]]
+    parts += [[*map(float, mode.values.values()), *mode.known.at(k)] for mode in modes_of(model)]
     if isinstance(model, JumpModel):
         parts.append([*model.chain_of_step.known.at(k)])
-    return np.array([value for part in parts for value in part] or [0.0])
+    return np.array([value for part in parts for value in part])
 
 
 def printed(model: Model | JumpModel) -> str:
     """The function's text; ModelError for a model that has no densities."""
-    modes, entries, cases = modes_of(model), count(), list[tuple[int, Sequence[sp.Expr]]]()
+    modes, entries = modes_of(model), count(2)
+    cases: list[tuple[int, Sequence[sp.Expr]]] = [(2 * len(modes), sp.symbols("c[0] c[1]"))]
 
     def names(letters: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Symbol]:
         """Symbols that are called as the next entries of c."""
@@ -90,28 +92,14 @@ def _real(name: str) -> sp.Symbol:
 
 
 def _case(which: int, outputs: Sequence[sp.Expr]) -> str:
-    printer = _Printer({"fully_qualified_modules": False})
-    shared, (mean, deviation) = sp.cse(outputs, symbols=sp.numbered_symbols("s"))
+    """One number at a time, of functions that numba knows."""
+    printer = PythonCodePrinter({"fully_qualified_modules": False})
+    branches = [part.rewrite((sp.sign, sp.Heaviside), sp.Piecewise) for part in outputs]
+    shared, (mean, deviation) = sp.cse(branches, symbols=sp.numbered_symbols("s"))
     lines = [f"{name} = {printer.doprint(value)}" for name, value in shared]
     lines += [f"mean[i] = {printer.doprint(mean)}", f"deviation[i] = {printer.doprint(deviation)}"]
     body = indent("\n".join(lines), 12 * " ")
     return f"    if which == {which}:\n        for i in range(points):\n{body}\n"
-
-
-class _Printer(PythonCodePrinter):
-    """One number at a time, of functions that numba knows."""
-
-    def _print_sign(self, expr: sp.sign) -> str:
-        value = self._print(expr.args[0])
-        return f"(0.0 if {value} == 0 else copysign(1.0, {value}))"
-
-    def _print_Heaviside(self, expr: sp.Heaviside) -> str:
-        value, middle = map(self._print, expr.args)
-        return f"({middle} if {value} == 0 else 1.0 if {value} > 0 else 0.0)"
-
-    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
-        cases = [f"{self._print(value)} if {self._print(holds)}" for value, holds in expr.args]
-        return f"({' else '.join(cases)} else nan)"
 
 
 @lru_cache(maxsize=256)

@@ -19,7 +19,8 @@ Looking back, `corrected` multiplies by what later measurements tell of x (`sour
     p(x_k | all y) ~ p(x_k | y_0..k) Integral p(x' | x_k) r(x') dx',
     r = all that y_k+1.. tell of x'
 
-A model comes as the address of one small function (`laws`), so that all this is compiled once for
+A model comes as the address of one small function,
+law(which, points, y, constants, x, mean, deviation) (`laws`), so that all this is compiled once for
 all models.  Everything compiled stands in this file, as the compiler keeps its work by the file's
 date.
 """
@@ -30,7 +31,7 @@ from math import atan2, cos, exp, floor, log, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 from numpy.polynomial import Chebyshev, Polynomial, legendre
 
 from kfcourse.filters.exact.columns import (
@@ -75,7 +76,6 @@ WOUND = 50  # turns of an angle whose noise is so large that it tells nothing
 
 # how a step ended; the others: why there is no posterior
 FINE, PANELLED, KERNELLED, EMPTY = range(4)
-MOVES, METER = 0, 1  # which law: of mode j, 2 j + MOVES and 2 j + METER
 
 # Columns of a panel's row that are of the step itself, behind those that are kept.
 HIGH, MASS, FIRST, SECOND, ROUGH, LOG_ROUGH, BOUND, SHARE, BEFORE, FIT = range(KEPT, KEPT + 10)
@@ -91,14 +91,7 @@ SLOPE = np.array(
     [legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T]
 ).T.copy()
 
-VALUES, TABLE = types.float64[::1], types.float64[:, ::1]
-# law(which, points, y, constants, x, mean, deviation)
-LAW = types.FunctionType(
-    types.void(types.int64, types.int64, types.float64, VALUES, VALUES, VALUES, VALUES)
-)
-
-HALVES = Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial)
-EXP2 = tuple(HALVES.coef.tolist())
+EXP2 = tuple(Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial).coef.tolist())
 LN2, SHIFT = np.log(2), 1.5 * 2.0**52
 ROOT_BITS, SHIFT_BITS = np.array([np.sqrt(0.5), SHIFT]).view(np.int64).tolist()
 LOG_ROOT = 0.5 * np.log(2 * np.pi)
@@ -137,9 +130,10 @@ def ln(x):
     k = (bits - ROOT_BITS) >> 52
     m = np.int64(bits - (k << 52)).view(np.float64)
     s = (m - 1) / (m + 1)
-    z = s * s
-    odd = (((((z / 15 + 1 / 13) * z + 1 / 11) * z + 1 / 9) * z + 1 / 7) * z + 1 / 5) * z + 1 / 3
-    return (np.int64(k + SHIFT_BITS).view(np.float64) - SHIFT) * LN2 + 2 * s * (odd * z + 1)
+    z, series = s * s, 0.0
+    for power in range(15, 0, -2):
+        series = series * z + 1 / power
+    return (np.int64(k + SHIFT_BITS).view(np.float64) - SHIFT) * LN2 + 2 * s * series
 
 
 @njit(**FAST)
@@ -149,17 +143,17 @@ def density(logarithm):
 
 
 class Setting(NamedTuple):
-    """A model's function, the mode that is looked at, its constants at a step, and the turns of y
-    and x.
+    """A model's function, which of its laws are the object's and the meter's, its constants at a
+    step, and the turns of y and x.
 
     The turn of what is no angle is infinite.
     """
 
     law: Any
-    mode: int
+    moves: int
+    meter: int
     constants: np.ndarray
-    turn: float
-    turn_of_state: float
+    turns: np.ndarray
 
 
 class Room(NamedTuple):
@@ -171,12 +165,12 @@ class Room(NamedTuple):
         kernel (4, KERNELS): rate r and r times centre, of half((r x - r centre)^2); weight, and
             the weight of the factor u^2
         group (3, KERNELS / Q): of Q kernels, where they begin and end, their least deviation
-        edge (3, 4 PANELS): a place; +1 where a law begins, -1 where it ends, 0 at a border; a
+        edge (4 PANELS, 3): a place; +1 where a law begins, -1 where it ends, 0 at a border; a
             deviation
-        later: three vectors (KERNELS,), what later measurements tell, as points, weights,
-            deviations; or laws whose moments are asked for
-        stack (2, TURNS + 2): parts of a panel that wait
-        point, work: four vectors (Q,) each, the first for arguments and results of the law
+        later: three vectors (KERNELS,), a prediction's kernels as means, masses, variances; or
+            what later measurements tell, as points, weights, deviations
+        stack (TURNS + 2, 2): parts of a panel that wait
+        point: five vectors (Q,), for arguments and results of the law; work: four
     """
 
     panels: np.ndarray
@@ -205,17 +199,46 @@ def points(left, right, x):
         x[i] = 0.5 * (left + right) + 0.5 * (right - left) * POINT[i]
 
 
+@njit(**FAST)
+def short_way(z, turn):
+    """The residual of an angle, the short way round."""
+    return z - turn * floor(z / turn + 0.5) if turn < np.inf else z
+
+
+@njit(**FAST)
+def wound(z, turn):
+    """What winding around the circle adds to an angle's log-likelihood: densities of all turns add
+    up."""
+    total, k = 1.0, 1
+    while k <= WOUND:
+        away = turn * k
+        nearer = exp(-0.5 * away * (away - 2 * z))
+        total += nearer + exp(-0.5 * away * (away + 2 * z))
+        k = k + 1 if nearer > 1e-17 else WOUND + 1
+    return log(total)
+
+
+@njit(**INNER)
+def unresolved(values):
+    """The sizes of the two last Legendre coefficients of what has these values on a panel."""
+    last = last_but_one = 0.0
+    for i in range(Q):
+        last += LAST[i] * values[i]
+        last_but_one += LAST_BUT_ONE[i] * values[i]
+    return abs(last) + abs(last_but_one)
+
+
 @njit(**INNER)
 def residual(model, which, y, spread, point):
-    """At a panel's points: z = (y - b) / sigma, q with ln p(y | x) = q - z^2 / 2, a turn in
-    deviations.
+    """At a panel's points: z = (y - b) / sigma, and near, of an angle the short way round; q with
+    ln p(y | x) = q - near^2 / 2; a turn in deviations.
 
     z is 1e100 where no noise makes y, and at a single state without noise, as it has no mass.  A
     missing y (NaN) tells nothing: z = q = 0.
     """
-    x, z, q, turn = point
-    model.law(2 * model.mode + which, Q, y, model.constants, x, z, q)
-    whole = model.turn if which == METER else model.turn_of_state
+    x, z, q, near, turn = point
+    model.law(which, Q, y, model.constants, x, z, q)
+    whole = model.turns[0 if which == model.meter else 1]
     for i in range(Q):
         deviation = max(sqrt(q[i] * q[i] + spread * spread), 1e-150)
         away = y - z[i]
@@ -228,26 +251,10 @@ def residual(model, which, y, spread, point):
         turn[i] = whole / deviation
         if y != y:
             z[i], q[i], turn[i] = 0.0, 0.0, np.inf
-
-
-@njit(**FAST)
-def short_way(z, turn):
-    """The residual of an angle, the short way round."""
-    return z - turn * floor(z / turn + 0.5) if turn < np.inf else z
-
-
-@njit(**FAST)
-def log_likelihood(z, q, turn):
-    """ln p(y | x); of an angle the law is wound around the circle: densities of all turns add
-    up."""
-    z = abs(short_way(z, turn))
-    total, k = 1.0, 1
-    while turn < np.inf and k <= WOUND:
-        away = turn * k
-        nearer = exp(-0.5 * away * (away - 2 * z))
-        total += nearer + exp(-0.5 * away * (away + 2 * z))
-        k = k + 1 if nearer > 1e-17 else WOUND + 1
-    return q - 0.5 * z * z + (log(total) if total > 1 else 0.0)
+        near[i] = z[i]
+    for i in range(Q if whole < np.inf and y == y else 0):
+        near[i] = short_way(z[i], turn[i])
+        q[i] += wound(abs(near[i]), turn[i])
 
 
 @njit(**INNER)
@@ -285,9 +292,9 @@ def predicted(room, total, x, logs):
 @njit(**INNER)
 def log_later(model, room, later):
     """Adds to z at a panel's points what later measurements tell of x, through the object's law."""
-    x, mean, deviation, _ = room.point
+    x, mean, deviation, _, _ = room.point
     place, weight, blur = room.later
-    model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, mean, deviation)
+    model.law(model.moves, Q, 0.0, model.constants, x, mean, deviation)
     for i in range(Q):
         total = 0.0
         for j in range(later):
@@ -302,13 +309,12 @@ def log_later(model, room, later):
 @njit(**INNER)
 def evaluate(model, room, y, p, total, later):
     """The logarithm of the posterior at the points of a panel, and what follows from it."""
-    row, (x, z, q, turn), fit = room.panels[p], room.point, room.work[0]
+    row, (x, z, q, near, _) = room.panels[p], room.point
     points(row[LEFT], row[RIGHT], x)
-    residual(model, METER, y, 0.0, room.point)
+    residual(model, model.meter, y, 0.0, room.point)
     predicted(room, total, x, row)
     for i in range(Q):
-        row[LIKELY + i] = log_likelihood(z[i], q[i], turn[i])
-        fit[i] = abs(short_way(z[i], turn[i]))
+        row[LIKELY + i] = q[i] - 0.5 * near[i] * near[i]
     if later:
         log_later(model, room, later)
         for i in range(Q):
@@ -317,21 +323,19 @@ def evaluate(model, room, y, p, total, later):
     for i in range(Q):
         before, row[i] = row[i], max(row[i] + row[LIKELY + i], -1e100)
         if row[i] > high:
-            high, row[BEFORE], row[FIT] = row[i], before, fit[i]
-    mass = first = second = a = b = d = e = 0.0
+            high, row[BEFORE], row[FIT] = row[i], before, abs(near[i])
+    mass = first = second = 0.0
+    logarithms, values = z, q
     for i in range(Q):
-        logarithm = max(row[i] - high, -80.0)
-        value = half(-1 / LN2 * logarithm)
-        mass += WEIGHT[i] * value
-        first += WEIGHT[i] * value * POINT[i]
-        second += WEIGHT[i] * value * POINT[i] * POINT[i]
-        a += LAST[i] * value
-        b += LAST_BUT_ONE[i] * value
-        d += LAST[i] * logarithm
-        e += LAST_BUT_ONE[i] * logarithm
+        logarithms[i] = max(row[i] - high, -80.0)
+        values[i] = density(logarithms[i])
+        mass += WEIGHT[i] * values[i]
+        first += WEIGHT[i] * values[i] * POINT[i]
+        second += WEIGHT[i] * values[i] * POINT[i] * POINT[i]
     row[HIGH], row[MASS] = high, 0.5 * (row[RIGHT] - row[LEFT]) * mass
     row[FIRST], row[SECOND] = first / mass, second / mass
-    row[ROUGH], row[LOG_ROUGH] = CURVED * ((abs(a) + abs(b)) / mass) ** 2, abs(d) + abs(e)
+    row[ROUGH] = CURVED * (unresolved(values) / mass) ** 2
+    row[LOG_ROUGH] = unresolved(logarithms)
 
 
 @njit(**INNER)
@@ -340,16 +344,16 @@ def new(P, n, left, right):
 
 
 @njit(**INNER)
-def depth(z, turn, i):
+def depth(z, near, turn, i):
     """How near to 0 the residual may come between its points i and i + 1.
 
     To 0 where it changes its sign, or passes a whole turn.  At a dip, twice as deep as a parabola.
     """
-    a, b = abs(short_way(z[i], turn[i])), abs(short_way(z[i + 1], turn[i + 1]))
-    if z[i] * z[i + 1] <= 0 or floor(z[i] / turn[i]) != floor(z[i + 1] / turn[i + 1]):
+    a, b = abs(near[i]), abs(near[i + 1])
+    if near[i] * near[i + 1] <= 0 or abs(z[i + 1] - z[i]) > 0.5 * turn[i]:
         return 0.0
-    left = i == 0 or abs(short_way(z[i - 1], turn[i - 1])) > a
-    right = i == Q - 2 or abs(short_way(z[i + 2], turn[i + 2])) > b
+    left = i == 0 or abs(near[i - 1]) > a
+    right = i == Q - 2 or abs(near[i + 2]) > b
     if not (left and right):
         return min(a, b)
     before = abs(z[i - 1] - 2 * z[i] + z[i + 1]) if i else 0.0
@@ -361,7 +365,7 @@ def depth(z, turn, i):
 def search(model, which, y, spread, room, n):
     """Halves n panels until no hump of the likelihood is hidden between two points: their
     number."""
-    P, (x, z, q, turn) = room.panels, room.point
+    P, (x, z, q, near, turn) = room.panels, room.point
     best, p, shortest = -np.inf, 0, ROUNDING * (P[n - 1, RIGHT] - P[0, LEFT])
     while p < n:
         left, right = P[p, LEFT], P[p, RIGHT]
@@ -369,10 +373,9 @@ def search(model, which, y, spread, room, n):
         residual(model, which, y, spread, room.point)
         bound, hidden = -np.inf, False
         for i in range(Q):
-            near = short_way(z[i], turn[i])
-            best = max(best, q[i] - 0.5 * near * near)
+            best = max(best, q[i] - 0.5 * near[i] * near[i])
         for i in range(Q - 1):
-            low = depth(z, turn, i)
+            low = depth(z, near, turn, i)
             top = max(q[i], q[i + 1]) - 0.5 * low * low
             bound = max(bound, top)
             hidden |= top > best - FAINT and abs(z[i + 1] - z[i]) > JUMP
@@ -383,7 +386,7 @@ def search(model, which, y, spread, room, n):
             n += 1
         else:
             new(P, p, left, right)
-            P[p, BOUND] = bound if which == METER else np.inf
+            P[p, BOUND] = bound if which == model.meter else np.inf
             p += 1
     return n
 
@@ -392,20 +395,19 @@ def search(model, which, y, spread, room, n):
 def weighed(P, n, likeliest, peak):
     """Shares of the panels, and of the density the integral, mean from the middle of a panel,
     variance."""
-    total = mean = variance = 0.0
-    for p in range(n):
-        total += P[p, MASS] * exp(max(P[p, HIGH] - peak, -700.0))
+    total = mean = square = 0.0
     origin = 0.5 * (P[likeliest, LEFT] + P[likeliest, RIGHT])
     for p in range(n):
-        P[p, SHARE] = P[p, MASS] * exp(max(P[p, HIGH] - peak, -700.0)) / total
+        P[p, SHARE] = P[p, MASS] * density(P[p, HIGH] - peak)
         middle, size = 0.5 * (P[p, LEFT] + P[p, RIGHT]) - origin, 0.5 * (P[p, RIGHT] - P[p, LEFT])
-        mean += P[p, SHARE] * (middle + size * P[p, FIRST])
+        first, second = size * P[p, FIRST], size * size * P[p, SECOND]
+        total += P[p, SHARE]
+        mean += P[p, SHARE] * (middle + first)
+        square += P[p, SHARE] * (middle * middle + 2 * middle * first + second)
     for p in range(n):
-        middle = 0.5 * (P[p, LEFT] + P[p, RIGHT]) - origin - mean
-        size = 0.5 * (P[p, RIGHT] - P[p, LEFT])
-        square = middle * middle + 2 * middle * size * P[p, FIRST] + size * size * P[p, SECOND]
-        variance += P[p, SHARE] * square
-    return total, mean, variance
+        P[p, SHARE] /= total
+    mean /= total
+    return total, mean, square / total - mean * mean
 
 
 @njit(**INNER)
@@ -435,14 +437,14 @@ def grown(P, n, height, whole):
     What panels have lost lies there.  It grows where measurements lead to where the state was never
     thought to be, by and by or at once: so a record that contradicts the model is known.
     """
-    mass = seen = 0.0
+    mass, seen, top = 0.0, 0.0, log(height)
     for p in range(n):
         for i in range(Q if P[p, MASS] > 0 else 0):
-            before = P[p, i] - P[p, LIKELY + i] - log(height)
+            before = P[p, i] - P[p, LIKELY + i] - top
             if before < -TAIL:
-                share = WEIGHT[i] * (P[p, RIGHT] - P[p, LEFT]) * exp(max(before, -700.0))
+                share = WEIGHT[i] * (P[p, RIGHT] - P[p, LEFT]) * density(before)
                 mass += share
-                seen += share * exp(min(P[p, LIKELY + i] - whole, 100.0))
+                seen += share * density(min(P[p, LIKELY + i] - whole, 100.0))
     return seen / mass if mass > 0 else 0.0
 
 
@@ -469,9 +471,9 @@ def corrected(model, room, y, n, total, later, accuracy, first, expected, number
     deviations.
     """
     P = room.panels
-    n = search(model, METER, y, 0.0, room, n)
+    n = search(model, model.meter, y, 0.0, room, n)
     if later:
-        n = search(model, MOVES, numbers[MEAN], sqrt(numbers[VARIANCE]), room, n)
+        n = search(model, model.moves, numbers[MEAN], sqrt(numbers[VARIANCE]), room, n)
     low, high, likeliest, peak, tolerance = np.inf, -np.inf, 0, -np.inf, 0.2 * accuracy
     for p in range(n):
         low, high = min(low, P[p, LEFT]), max(high, P[p, RIGHT])
@@ -560,12 +562,17 @@ def between(before, after, t):
 
 
 @njit(**INNER)
-def polynomial(row, start, top, power):
-    """Powers' coefficients of a row's logarithms, from `start` on, less `top`."""
+def polynomial(row, start, power):
+    """Powers' coefficients of a row's logarithms, from `start` on, less the highest, which is
+    returned."""
+    top = -np.inf
+    for i in range(Q):
+        top = max(top, row[start + i])
     for k in range(Q):
         power[k] = 0.0
         for i in range(Q):
             power[k] += POWER[k, i] * max(row[start + i] - top, -80.0)
+    return top
 
 
 @njit(**FAST)
@@ -578,18 +585,10 @@ def value_at(power, t):
 
 
 @njit(**INNER)
-def highest(row, start):
-    top = -np.inf
-    for i in range(Q):
-        top = max(top, row[start + i])
-    return top
-
-
-@njit(**INNER)
 def in_halves(stack, waiting, a, b):
     """Puts both halves of [a, b] on the stack, the left one on top."""
-    stack[0, waiting], stack[1, waiting] = 0.5 * (a + b), b
-    stack[0, waiting + 1], stack[1, waiting + 1] = a, 0.5 * (a + b)
+    middle = 0.5 * (a + b)
+    stack[waiting], stack[waiting + 1] = (middle, b), (a, middle)
     return waiting + 2
 
 
@@ -600,33 +599,32 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
     The logarithm of a weight is `shift`; a weight that depends on the state is a law, `weight_law`
     < 0.
     """
-    kernel, group, edge, stack = room.kernel, room.group, room.edge, room.stack
-    (x, m, s, _), (power, mass, deviation, weight) = room.point, room.work
+    kernel, group, edge, stack, (means, masses, variances) = (
+        room.kernel, room.group, room.edge, room.stack, room.later
+    )  # fmt: skip
+    (x, m, s, _, _), (power, mass, deviation, weight) = room.point, room.work
     count, many, height, error = total
     span = SPAN * min(accuracy / 1e-3, 1.0) ** (1 / 14)
     for p in range(len(B)):
         middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
-        top, (before, after) = highest(B[p], 0), widths(B, p)
-        polynomial(B[p], 0, top, power)
-        stack[0, 0], stack[1, 0], waiting, low, high = -1.0, 1.0, 1, np.inf, -np.inf
+        top, (before, after) = polynomial(B[p], 0, power), widths(B, p)
+        stack[0], waiting, low, high = (-1.0, 1.0), 1, np.inf, -np.inf
         while waiting:
             waiting -= 1
-            a, b = stack[0, waiting], stack[1, waiting]
+            a, b = stack[waiting, 0], stack[waiting, 1]
             part = 0.5 * (b - a)
             points(middle + size * a, middle + size * b, x)
+            weight[:] = 1.0
             if weight_law < 0:
                 model.law(weight_law, Q, 0.0, model.constants, x, weight, s)
-            model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, m, s)
+            model.law(model.moves, Q, 0.0, model.constants, x, m, s)
             share, covered, least, calm, steep = 0.0, 0.0, np.inf, np.inf, False
             for i in range(1, Q):
                 covered = max(covered, abs(m[i] - m[0]))
-            d = e = f = g = 0.0
             for i in range(Q):
                 t, slope = 0.5 * (a + b) + part * POINT[i], 0.0
                 value = value_at(power, t) if part < 1 else B[p, i] - top
-                mass[i] = WEIGHT[i] * part * size * density(value + top + shift)
-                if weight_law < 0:
-                    mass[i] *= weight[i]
+                mass[i] = WEIGHT[i] * part * size * density(value + top + shift) * weight[i]
                 share += mass[i]
                 for k in range(Q):
                     slope += SLOPE[i, k] * m[k]
@@ -639,12 +637,8 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 )
                 deviation[i] = sqrt(s[i] * s[i] + blur * blur + 1e-300)
                 least = min(least, deviation[i])
-                d += LAST[i] * m[i]
-                e += LAST_BUT_ONE[i] * m[i]
-                f += LAST[i] * s[i]
-                g += LAST_BUT_ONE[i] * s[i]
             digits = 10 * ROUNDING * abs(m[0])
-            rough = max(abs(d) + abs(e) + abs(f) + abs(g) - digits, 0.0) / least
+            rough = max(unresolved(m) + unresolved(s) - digits, 0.0) / least
             # a measurement may ask for what has little share
             gaps = (
                 covered > span * least
@@ -664,6 +658,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 kernel[0, j], kernel[1, j] = rate, m[i] * rate
                 kernel[2, j], kernel[3, j] = amount * (1 + extra), amount * extra * 2 * LN2
                 height += kernel[2, j]
+                means[j], masses[j], variances[j] = m[i], mass[i], s[i] * s[i]
                 group[0, count] = min(group[0, count], m[i] - WINDOW * wide)
                 group[1, count] = max(group[1, count], m[i] + WINDOW * wide)
                 reach = REACH * REACH + 2 * ln(max(mass[i], 1e-299))
@@ -673,14 +668,13 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
             count += 1
             error += share * rough
             if a == -1:
-                edge[0, many], edge[1, many], edge[2, many] = m[0], 0.0, deviation[0]
+                edge[many] = m[0], 0.0, deviation[0]
                 many += 1
             if b == 1:
-                edge[0, many], edge[1, many], edge[2, many] = m[Q - 1], 0.0, deviation[Q - 1]
+                edge[many] = m[Q - 1], 0.0, deviation[Q - 1]
                 many += 1
         if low < high:
-            edge[0, many], edge[1, many], edge[2, many] = low, 1.0, 0.0
-            edge[0, many + 1], edge[1, many + 1], edge[2, many + 1] = high, -1.0, 0.0
+            edge[many], edge[many + 1] = (low, 1.0, 0.0), (high, -1.0, 0.0)
             many += 2
     return FINE, Sum(count, many, height, error)
 
@@ -691,13 +685,13 @@ def borders(room, many):
     many."""
     edge, P = room.edge, room.panels
     for i in range(1, many):
-        while i and edge[0, i - 1] > edge[0, i]:
-            for row in range(3):
-                edge[row, i], edge[row, i - 1] = edge[row, i - 1], edge[row, i]
+        while i and edge[i - 1, 0] > edge[i, 0]:
+            for column in range(3):
+                edge[i, column], edge[i - 1, column] = edge[i - 1, column], edge[i, column]
             i -= 1
     open_, n, last, width = 0, 0, edge[0, 0], 0.0
     for i in range(many):
-        place, kind, deviation = edge[0, i], edge[1, i], edge[2, i]
+        place, kind, deviation = edge[i, 0], edge[i, 1], edge[i, 2]
         apart = kind == 0 and open_ > 0 and place - last > APART * min(deviation, width)
         ends = (kind > 0 and open_ == 0) or (kind < 0 and open_ == 1)
         if place > last and n < PANELS // 2 and (apart or ends):
@@ -709,21 +703,6 @@ def borders(room, many):
 
 
 @njit(**INNER)
-def from_prior(mean, deviation, probability, room):
-    """The prior as a prediction, its first two panels: how much room it takes."""
-    rate = sqrt(0.5 / LN2) / deviation
-    for j in range(Q):
-        room.kernel[0, j], room.kernel[1, j] = rate, mean * rate
-        room.kernel[2, j] = room.kernel[3, j] = 0.0
-    room.kernel[2, 0] = probability * sqrt(0.5 / np.pi) / deviation
-    room.group[0, 0], room.group[1, 0] = mean - WINDOW * deviation, mean + WINDOW * deviation
-    room.group[2, 0] = deviation
-    new(room.panels, 0, mean - REACH * deviation, mean)
-    new(room.panels, 1, mean, mean + REACH * deviation)
-    return Sum(1, 0, room.kernel[2, 0], 0.0)
-
-
-@njit(**INNER)
 def sources(B, least, room):
     """What y_k+1.. tell of the next state, as points, weights and deviations of kernels: how many.
 
@@ -732,12 +711,11 @@ def sources(B, least, room):
     (place, weight, blurs), stack, power, count = room.later, room.stack, room.work[0], 0
     for p in range(len(B)):
         middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
-        top, (before, after) = highest(B[p], LIKELY), widths(B, p)
-        polynomial(B[p], LIKELY, top, power)
-        stack[0, 0], stack[1, 0], waiting = -1.0, 1.0, 1
+        top, (before, after) = polynomial(B[p], LIKELY, power), widths(B, p)
+        stack[0], waiting = (-1.0, 1.0), 1
         while waiting:
             waiting -= 1
-            a, b = stack[0, waiting], stack[1, waiting]
+            a, b = stack[waiting, 0], stack[waiting, 1]
             blur = min(before, after)
             if (b - a) * size > SPAN * sqrt(least * least + blur * blur) and b - a > 1e-9:
                 waiting = in_halves(stack, waiting, a, b)
@@ -757,10 +735,10 @@ def sources(B, least, room):
 @njit(**INNER)
 def least_deviation(model, room, n):
     """Of the object's noise at the points of n panels."""
-    (x, m, s, _), least = room.point, np.inf
+    (x, m, s, _, _), least = room.point, np.inf
     for p in range(n):
         points(room.panels[p, LEFT], room.panels[p, RIGHT], x)
-        model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, m, s)
+        model.law(model.moves, Q, 0.0, model.constants, x, m, s)
         for i in range(Q):
             least = min(least, s[i])
     return least
@@ -789,42 +767,16 @@ def moments(room, count, turn):
     return whole, short_way(centre + first, turn), second / whole - first * first
 
 
-@njit(**INNER)
-def of_panels(B, room):
-    """Puts the density on panels B into the room as laws of single points: how many."""
-    mean, mass, variance = room.later
-    for p in range(len(B)):
-        points(B[p, LEFT], B[p, RIGHT], room.point[0])
-        for i in range(Q):
-            j = p * Q + i
-            mean[j], variance[j] = room.point[0][i], 0.0
-            mass[j] = WEIGHT[i] * 0.5 * (B[p, RIGHT] - B[p, LEFT]) * density(B[p, i])
-    return len(B) * Q
-
-
-@njit(**INNER)
-def of_kernels(total, room):
-    """Puts the kernels of a prediction into the room as laws: how many."""
-    mean, mass, variance = room.later
-    for j in range(total.groups * Q):
-        rate, centre = room.kernel[0, j], room.kernel[1, j]
-        weight, bent = room.kernel[2, j], room.kernel[3, j]
-        wide, half_bent = sqrt(0.5 / LN2) / rate, bent / (2 * LN2)
-        mean[j], mass[j] = centre / rate, (weight - half_bent) / rate * sqrt(np.pi / LN2)
-        variance[j] = wide * wide * (1 - 2 * half_bent / max(weight - half_bent, 1e-300))
-    return total.groups * Q
-
-
 @njit(**FAST)
 def room_for_a_step():
     return Room(
         np.empty((PANELS + 4, COLUMNS)),
         np.empty((4, KERNELS)),
         np.empty((3, KERNELS // Q)),
-        np.empty((3, 4 * PANELS)),
+        np.empty((4 * PANELS, 3)),
         (np.empty(KERNELS), np.empty(KERNELS), np.empty(KERNELS)),
-        np.empty((2, TURNS + 2)),
-        (np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)),
+        np.empty((TURNS + 2, 2)),
+        (np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)),
         (np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)),
     )
 
@@ -843,14 +795,13 @@ def mixed(numbers):
 
 
 @njit(**INNER)
-def prediction(law, mode, constants, turns, posterior, begin, numbers, weight, room, accuracy):
-    """The sum of kernels from the posteriors of all modes to one: how it ended, how much room it
-    takes.
+def prediction(model, posterior, begin, numbers, weight, room, accuracy):
+    """The sum of kernels from the posteriors of all modes to the model's: how it ended, how much
+    room it takes.
 
     weight : probabilities of transitions (J, J), negative where they depend on the state.
     """
-    model = Setting(law, mode, constants, turns[0], turns[1])
-    status, total, modes = FINE, Sum(0, 0, 0.0, 0.0), len(weight)
+    status, total, modes, mode = FINE, Sum(0, 0, 0.0, 0.0), len(weight), model.meter // 2
     for i in range(modes):
         rows, by_state = posterior[begin[i] : begin[i + 1]], weight[i, mode] < 0
         share = numbers[i, PROBABILITY] * abs(weight[i, mode])
@@ -860,24 +811,18 @@ def prediction(law, mode, constants, turns, posterior, begin, numbers, weight, r
     return status, total
 
 
-ADVANCE = types.Tuple((TABLE, types.int64[::1]))(
-    LAW, TABLE, VALUES, VALUES, TABLE, TABLE, types.int64[::1], TABLE, types.int64[::1], TABLE,
-    types.boolean, types.float64, TABLE,
-)  # fmt: skip
-
-
-@njit(ADVANCE, cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def advance(
     law,
     constants,
     turns,
     y,
-    prior,
     before,
     begin,
     later,
     later_begin,
     transitions,
+    first,
     back,
     accuracy,
     numbers,
@@ -892,14 +837,14 @@ def advance(
     turns : ndarray (2,)
         Of y and of x, infinite for what is no angle.
     y : ndarray (T,)
-    prior : ndarray (J, 3)
-        Mean and deviation, and the probability of each mode; not looked at after the first step.
     before, begin : ndarray (rows, KEPT), (T J + 1,)
-        Posteriors of the step before; none before the first step.
+        Posteriors of the step before.
     later, later_begin
         What is known of the next step, looking back.
     transitions : ndarray (2 J, J)
         To the next step, and to this one; negative where they depend on the state.
+    first : bool
+        Whether the object's law is the prior, whatever was before.
     back : bool
     accuracy : float
     numbers : ndarray (T J, NUMBERS)
@@ -913,34 +858,22 @@ def advance(
         begin.
     """
     room = room_for_a_step()
-    T, modes = len(y), len(prior)
-    first, used = len(before) == 0, 0
+    T, modes, used = len(y), transitions.shape[1], 0
     after, places = np.empty((8 * T * modes + 64, KEPT)), np.zeros(T * modes + 1, dtype=np.int64)
     for t in range(T):
         start = t * modes
         here = numbers[start : start + modes]
-        known, n, later_count, lost = here.copy(), 0, 0, 0.0
+        known, later_count, lost = here.copy(), 0, 0.0
         for j in range(modes):
             lost += known[j, PROBABILITY] * known[j, LOST]
         for j in range(modes):
-            model = Setting(law, j, constants[0], turns[0], turns[1])
-            if first:
-                status, total = FINE, from_prior(prior[j, 0], prior[j, 1], prior[j, 2], room)
-                n = 2 if prior[j, 2] > 0 else 0
-            else:
-                status, total = prediction(
-                    law,
-                    j,
-                    constants[1],
-                    turns,
-                    before,
-                    begin[start:],
-                    known,
-                    transitions[modes:],
-                    room,
-                    accuracy,
-                )
-                n = borders(room, total.edges) if status == FINE and total.edges else 0
+            moves = 2 * modes if first else 2 * j
+            earlier = Setting(law, moves, 2 * j + 1, constants[1], turns)
+            model = Setting(law, 2 * j, 2 * j + 1, constants[0], turns)
+            status, total = prediction(
+                earlier, before, begin[start:], known, transitions[modes:], room, accuracy
+            )
+            n = borders(room, total.edges) if status == FINE and total.edges else 0
             if back and n:
                 rows = later[later_begin[t] : later_begin[t + 1]]
                 later_count = sources(rows, least_deviation(model, room, n), room)
@@ -965,26 +898,15 @@ def advance(
                 more[:used] = after[:used]
                 after = more
             after[used : used + kept] = room.panels[:kept, :KEPT]
-            if kept and turns[1] < np.inf:
-                count = of_panels(after[used : used + kept], room)
-                _, here[j, MEAN], here[j, VARIANCE] = moments(room, count, turns[1])
             used += kept
             places[start + j + 1] = used
         mixed(here)
         for j in range(0 if back else modes):
+            model = Setting(law, 2 * j, 2 * j + 1, constants[0], turns)
             status, total = prediction(
-                law,
-                j,
-                constants[0],
-                turns,
-                after,
-                places[start:],
-                here,
-                transitions[:modes],
-                room,
-                accuracy,
+                model, after, places[start:], here, transitions[:modes], room, accuracy
             )
-            mass, mean, variance = moments(room, of_kernels(total, room), turns[1])
+            mass, mean, variance = moments(room, Q * total.groups, turns[1])
             here[j, NEXT_MEAN], here[j, NEXT_VARIANCE] = mean, variance
             here[j, EXPECTED] = mass if status == FINE else 1.0  # so that the next step is refused
     return after[:used].copy(), places

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import moments_on_circle
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.exact.columns import (
@@ -40,8 +41,7 @@ from kfcourse.symbolic.reading import ModelError
 ACCURACY = 1e-3
 FINEST = 1e-6  # what a sum of eight kernels over five deviations allows
 TOLERABLE = 0.1  # error of a step, in deviations, beyond which there is no posterior
-CHUNK = 64  # trajectories that a thread takes at once: some milliseconds
-SHARPEST = 1e-7  # deviation of a prior without variance, in units of its mean, or of 1
+CHUNK = 256  # trajectories that a thread takes at once: some milliseconds
 NEGLIGIBLE = 1e-12  # probability of a mode whose density need not be found
 PARTS = 16  # of a panel, in which a drawn state is uniform: some tenth of a deviation
 REASONS = (
@@ -94,13 +94,10 @@ class PointMass(NamedTuple):
     def density(self, run: int, mode: int = 0) -> tuple[Array, Array]:
         """States x (M,), ascending, at which a trajectory's posterior is held, and p(x, mode)
         there."""
-        from kfcourse.filters.exact.panels import POINT
-
         place = run * self.numbers.shape[1] + mode
         rows = self.panels[self.begin[place] : self.begin[place + 1]]
-        middle, size = rows[:, LEFT] + rows[:, RIGHT], rows[:, RIGHT] - rows[:, LEFT]
-        x = 0.5 * (middle[:, None] + size[:, None] * POINT)
-        return x.ravel(), np.exp(rows[:, :Q]).ravel() * self.probability[run, mode]
+        p = np.exp(rows[:, :Q]) * self.probability[run, mode]
+        return _points(rows)[0].ravel(), p.ravel()
 
     def drawn(self, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
         """As of `Filter`: within a part of a panel all states are equally likely."""
@@ -190,26 +187,20 @@ class Exact:
     accuracy: float
 
     def init(self, runs: int) -> State:
-        chances = self._prior()[:, 2]
+        chances = self.model.first if isinstance(self.model, JumpModel) else np.ones(1)
         numbers = np.zeros((runs, len(chances), NUMBERS))
         numbers[:, :, PROBABILITY] = numbers[:, :, EXPECTED] = chances
-        begin = np.zeros(runs * len(chances) + 1, dtype=np.int64)
-        memory = PointMass(np.empty((0, KEPT)), begin, numbers, *np.zeros((3, runs)))
+        # a panel for each, from wherever the first state is drawn
+        panels = np.zeros((runs * len(chances), KEPT))
+        panels[:, RIGHT] = 1.0
+        memory = PointMass(panels, np.arange(len(panels) + 1), numbers, *np.zeros((3, runs)))
         return initial_state(modes_of(self.model)[0])(runs)._replace(memory=memory)
 
     def step(self, state: State, y: Array) -> State:
         k, before = state.step, state.memory
-        panels, begin, numbers = self._advance(k, y[:, 0], before)
-        memory = PointMass(panels, begin, numbers, *np.zeros((3, len(y))))
-        posterior = _law(numbers, MEAN, memory.probability)
-        error = _error(numbers, posterior)
-        self._check(f"step {k}", memory, before.expected, error)
-        memory = memory._replace(
-            log_likelihood=np.where(np.isnan(y[:, 0]), 0.0, _log_sum(numbers[:, :, EVIDENCE])),
-            error=before.error + error,
-            variance=posterior.cov[:, 0, 0],
-        )
-        return State(k + 1, posterior, _law(numbers, NEXT_MEAN, memory.expected), memory)
+        memory, posterior = self._advance(f"step {k}", k, y[:, 0], before)
+        ahead = _law(memory.numbers, NEXT_MEAN, memory.expected)
+        return State(k + 1, posterior, ahead, memory._replace(error=before.error + memory.error))
 
     def look_back(self, states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         """`Filter.look_back` of a model without modes."""
@@ -220,29 +211,22 @@ class Exact:
             yield state
             for k in reversed(range(end - 1)):
                 before, filtered = visited[k].memory, visited[k + 1].memory
-                panels, begin, numbers = self._advance(k, y[k, :, 0], before, state.memory)
-                memory = filtered._replace(panels=panels, begin=begin, numbers=numbers)
-                law = _law(numbers, MEAN, memory.probability)
-                self._check(
-                    f"looking back to step {k}", memory, filtered.probability, _error(numbers, law)
+                where = f"looking back to step {k}"
+                memory, law = self._advance(where, k, y[k, :, 0], before, state.memory)
+                error = error + memory.error
+                memory = memory._replace(
+                    log_likelihood=filtered.log_likelihood, error=filtered.error + error
                 )
-                error = error + _error(numbers, law)
-                memory = memory._replace(error=filtered.error + error, variance=law.cov[:, 0, 0])
                 state = State(k + 1, law, law, memory)
                 yield state
 
         return back
 
-    def _prior(self) -> Array:
-        """Mean, deviation, and the mode's probability, (J, 3)."""
-        mean, deviation = self.model.prior.mean[0], np.sqrt(self.model.prior.cov[0, 0])
-        deviation = max(deviation, SHARPEST * max(abs(mean), 1.0))
-        chances = self.model.first if isinstance(self.model, JumpModel) else np.ones(1)
-        return np.array([[mean, deviation, chance] for chance in chances], dtype=float)
-
     def _transitions(self, k: int) -> Array:
         """Probabilities of transitions from step k, (J, J); negative where they depend on the
-        state."""
+        state; none before the first."""
+        if k < 0:
+            return np.eye(len(modes_of(self.model)))
         if not isinstance(self.model, JumpModel):
             return np.ones((1, 1))
         if self.model.by_state:
@@ -250,9 +234,9 @@ class Exact:
         return self.model.transition_at(k)
 
     def _advance(
-        self, k: int, y: Array, before: PointMass, later: PointMass | None = None
-    ) -> tuple[Array, Array, Array]:
-        """Panels of the posteriors at step k, where they begin, their numbers; looking back from
+        self, where: str, k: int, y: Array, before: PointMass, later: PointMass | None = None
+    ) -> tuple[PointMass, Gaussian]:
+        """The posteriors at step k, with the error of this step, and their law; looking back from
         `later`.
 
         Threads take some trajectories each.  What they compute does not depend on how many there
@@ -262,28 +246,28 @@ class Exact:
 
         from kfcourse.filters.exact.panels import advance
 
-        law, prior, last = load(self.text), self._prior(), max(k - 1, 0)
-        now_and_then = np.stack([constants(self.model, k), constants(self.model, last)])
-        chain = np.concatenate([self._transitions(k), self._transitions(last)])
+        compiled = load(self.text)
+        chain = np.concatenate([self._transitions(k), self._transitions(k - 1)])
+        now_and_then = np.stack([constants(self.model, max(k - back, 0)) for back in (0, 1)])
         turns = np.array([2 * np.pi if which else np.inf for which in reversed(self.model.angles)])
         ahead = later or before
-        numbers, values, size = ahead.numbers.copy(), np.array(y, dtype=float), len(prior)
+        numbers, values, size = ahead.numbers.copy(), np.array(y, dtype=float), chain.shape[1]
         numbers[:, :, LOST] = before.numbers[:, :, LOST]
 
         def chunk(start: int) -> tuple[Array, Array]:
             runs = slice(start, start + CHUNK)
             ends = slice(start * size, (start + CHUNK) * size + 1)
             return advance(
-                law,
+                compiled,
                 now_and_then,
                 turns,
                 values[runs],
-                prior,
                 before.panels,
                 before.begin[ends],
                 ahead.panels,
                 ahead.begin[ends],
                 chain,
+                k == 0,
                 later is not None,
                 self.accuracy,
                 numbers[runs].reshape(-1, NUMBERS),
@@ -291,17 +275,27 @@ class Exact:
 
         starts, threads = range(0, len(values), CHUNK), config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         if len(starts) == 1 or threads == 1:
-            parts = [chunk(start) for start in starts]
+            parts = list(map(chunk, starts))
         else:
             with ThreadPoolExecutor(threads) as pool:
                 parts = list(pool.map(chunk, starts))
-        lengths = np.concatenate([[0], *(np.diff(begin) for _, begin in parts)])
-        return np.concatenate([panels for panels, _ in parts]), np.cumsum(lengths), numbers
+        panels = np.concatenate([panels for panels, _ in parts])
+        begin = np.cumsum(np.concatenate([[0], *(np.diff(begin) for _, begin in parts)]))
+        if self.model.angles.x:
+            x, mass = _points(panels)
+            for run, rows in enumerate(map(slice, begin, begin[1:])):
+                moments = moments_on_circle(x[rows].ravel(), mass[rows].ravel())
+                numbers[run, 0, [MEAN, VARIANCE]] = moments
+        law = _law(numbers, MEAN, numbers[:, :, PROBABILITY])
+        evidence = np.where(np.isnan(y), 0.0, np.logaddexp.reduce(numbers[:, :, EVIDENCE], axis=1))
+        memory = PointMass(panels, begin, numbers, evidence, _error(numbers, law), law.cov[:, 0, 0])
+        self._check(where, memory, before.expected)
+        return memory, law
 
-    def _check(self, where: str, memory: PointMass, expected: Array, error: Array) -> None:
+    def _check(self, where: str, memory: PointMass, expected: Array) -> None:
         """Unresolved if a mode that is possible has no posterior, or an error is too large."""
         empty = (np.diff(memory.begin).reshape(expected.shape) == 0) & (expected > NEGLIGIBLE)
-        wrong = empty.any(axis=1) | ~(error < TOLERABLE)
+        wrong = empty.any(axis=1) | ~(memory.error < TOLERABLE)
         if not wrong.any():
             return
         run = int(np.argmax(wrong))
@@ -314,16 +308,20 @@ class Exact:
         )
 
 
+def _points(panels: Array) -> tuple[Array, Array]:
+    """States at the points of panels, and the masses of the density there, both (rows, Q)."""
+    from kfcourse.filters.exact.panels import POINT, WEIGHT
+
+    left, right = panels[:, LEFT, None], panels[:, RIGHT, None]
+    x = left * (0.5 - 0.5 * POINT) + right * (0.5 + 0.5 * POINT)
+    return x, np.exp(panels[:, :Q]) * WEIGHT * 0.5 * (right - left)
+
+
 def _law(numbers: Array, mean: int, probability: Array) -> Gaussian:
     """Mean and variance over all modes, from the columns `mean` and the one behind it."""
     modes = np.moveaxis(numbers, 1, 0)
     laws = [Gaussian(mode[:, mean, None], mode[:, mean + 1, None, None]) for mode in modes]
     return mixture(laws, probability)
-
-
-def _log_sum(logs: Array) -> Array:
-    top = logs.max(axis=1, keepdims=True)
-    return (top + np.log(np.exp(logs - top).sum(axis=1, keepdims=True)))[:, 0]
 
 
 def _error(numbers: Array, law: Gaussian) -> Array:
