@@ -132,8 +132,7 @@ def test_the_lab_of_variant_53(call, tmp_path):
     assert result.exit_code == 0, result.output
     assert "is more accurate than" in result.output
     scores = result.output.split("CRPS\n")[1].splitlines()
-    # the exact law is not normal
-    assert {line.split()[0] for line in scores if line.endswith("–")} == {"exact"}
+    assert len(scores) >= 8 and not [line for line in scores if line.endswith("–")]
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     names = {*LAB, "aof-exact"}
     for key in ("error_variance", "standard_error"):

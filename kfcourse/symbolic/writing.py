@@ -102,7 +102,7 @@ class _Writer(Printer):
         return self.terms(expr)
 
     def _print_Mul(self, expr: sp.Mul) -> str:
-        factors = sorted(expr.args, key=self.factor_key)
+        factors = sorted(sp.Mul.make_args(expr), key=self.factor_key)  # a 1/x comes here, too
         return super()._print_Mul(sp.Mul(*factors, evaluate=False))
 
     def factor_key(self, factor: sp.Expr) -> tuple[bool, bool, int, str]:

@@ -162,4 +162,4 @@ def test_scores_stand_in_the_numbers(compared, tmp_path):
             np.testing.assert_array_equal(printed, estimate.value)
             errors = np.array(numbers[f"{kind}_standard_error"][name], dtype=float)
             np.testing.assert_array_equal(errors, estimate.standard_error)
-    assert numbers["crps"]["aof-exact"] == [None] * 3
+    assert None not in numbers["crps"]["aof-exact"]

@@ -25,6 +25,8 @@ c, e, f, g, h, s, T = sp.symbols("c e f g h s T", real=True)
         (z - T * g * sp.sin(x) + v, [x, z], [v], r"z - T g \sin {x} + v"),
         (sp.S.Zero, [x], [], "0"),
         (-c * x, [x], [], "- c x"),
+        (1 / (x**2 + 1), [x], [], r"\frac{1}{x^{2} + 1}"),
+        (c / x, [x], [], r"\frac{c}{x}"),
     ],
 )
 def test_order(expression, variables, noises, latex) -> None:

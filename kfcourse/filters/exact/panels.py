@@ -395,19 +395,21 @@ def search(model, which, y, spread, room, n):
 def weighed(P, n, likeliest, peak):
     """Shares of the panels, and of the density the integral, mean from the middle of a panel,
     variance."""
-    total = mean = square = 0.0
+    total = mean = variance = 0.0
     origin = 0.5 * (P[likeliest, LEFT] + P[likeliest, RIGHT])
     for p in range(n):
-        P[p, SHARE] = P[p, MASS] * density(P[p, HIGH] - peak)
         middle, size = 0.5 * (P[p, LEFT] + P[p, RIGHT]) - origin, 0.5 * (P[p, RIGHT] - P[p, LEFT])
-        first, second = size * P[p, FIRST], size * size * P[p, SECOND]
+        P[p, SHARE] = P[p, MASS] * density(P[p, HIGH] - peak)
         total += P[p, SHARE]
-        mean += P[p, SHARE] * (middle + first)
-        square += P[p, SHARE] * (middle * middle + 2 * middle * first + second)
+        mean += P[p, SHARE] * (middle + size * P[p, FIRST])
+    mean /= total
     for p in range(n):
         P[p, SHARE] /= total
-    mean /= total
-    return total, mean, square / total - mean * mean
+        middle = 0.5 * (P[p, LEFT] + P[p, RIGHT]) - origin - mean
+        size = 0.5 * (P[p, RIGHT] - P[p, LEFT])
+        square = middle * middle + 2 * middle * size * P[p, FIRST] + size * size * P[p, SECOND]
+        variance += P[p, SHARE] * square
+    return total, mean, variance
 
 
 @njit(**INNER)
