@@ -11,7 +11,7 @@ def ended(*processes: psutil.Process | int, seconds: float = 20) -> bool:
     One that has ended may stay a zombie: who adopts orphans need not bury them at once, or at all.
     """
     end = time.monotonic() + seconds
-    while any(not _ended(one) for one in processes):
+    while any(not _ended(child) for child in processes):
         if time.monotonic() > end:
             return False
         time.sleep(0.05)
@@ -20,7 +20,7 @@ def ended(*processes: psutil.Process | int, seconds: float = 20) -> bool:
 
 def _ended(process: psutil.Process | int) -> bool:
     try:
-        one = psutil.Process(process) if isinstance(process, int) else process
-        return one.status() == psutil.STATUS_ZOMBIE
+        child = psutil.Process(process) if isinstance(process, int) else process
+        return child.status() == psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:
         return True

@@ -103,8 +103,8 @@ def execute_inside(notebook, name=""):
                 shown = value._repr_mimebundle_()
                 cell.outputs = [nbformat.v4.new_output("execute_result", shown)]
         except Exception as error:
-            told = {"ename": type(error).__name__, "evalue": str(error)}
-            cell.outputs = [nbformat.v4.new_output("error", **told)]
+            failure = {"ename": type(error).__name__, "evalue": str(error)}
+            cell.outputs = [nbformat.v4.new_output("error", **failure)]
     return result
 
 

@@ -19,11 +19,11 @@ pytestmark = pytest.mark.quick
 
 
 def verdicts(model, names=tuple(FILTERS)):
-    return {one.name: one for one in admissions(model, names)}
+    return {each.name: each for each in admissions(model, names)}
 
 
-def kinds(found, verdict):
-    return {name for name, one in found.items() if one.verdict == verdict}
+def kinds(result, verdict):
+    return {name for name, each in result.items() if each.verdict == verdict}
 
 
 GAUSSIAN, LINEARISED = (
@@ -64,35 +64,35 @@ TWO = ["x1 + 0.1*x2", "x2 + v1"]
     ],
 )
 def test_what_cannot_be_built_is_refused_with_the_reason(model, refused, says):
-    found = verdicts(model)
-    assert kinds(found, "no") == refused
-    assert all(words in found[name].says for name, words in says.items())
+    result = verdicts(model)
+    assert kinds(result, "no") == refused
+    assert all(words in result[name].says for name, words in says.items())
 
 
 def test_what_can_be_built_and_will_not_do_is_warned_of(variant53):
     """UKF: x^2 w is 0 on both axes, so nothing of f^2 3 d^2 is seen."""
-    found = verdicts(variant53)
-    assert kinds(found, "no") == set() and kinds(found, "poor") == {"aof-unscented"}
+    result = verdicts(variant53)
+    assert kinds(result, "no") == set() and kinds(result, "poor") == {"aof-unscented"}
     unseen = "see 0 % of the variance of the measurement that the state does not explain"
-    assert unseen in found["aof-unscented"].says
-    assert found["particle"].says == found["aof-exact"].says == ""
+    assert unseen in result["aof-unscented"].says
+    assert result["particle"].says == result["aof-exact"].says == ""
     # of the variance c^2 + 1 of (c + x) w the points see c^2: less than half of it, or more
     for part, verdict in ((0.8, "poor"), (1.2, "yes")):
         seen = verdicts(Model.define("0.9*x + v", f"x + ({part} + x)*w"), ["aof-unscented"])
         assert seen["aof-unscented"].verdict == verdict
-    found = verdicts(Model.define("0.9*x + v", "x**2 + w"))
-    assert kinds(found, "poor") >= LINEARISED
-    assert "tangent of y at the prior's mean is level" in found["fos3-linearised"].says
+    result = verdicts(Model.define("0.9*x + v", "x**2 + w"))
+    assert kinds(result, "poor") >= LINEARISED
+    assert "tangent of y at the prior's mean is level" in result["fos3-linearised"].says
     growth = Model.define(
         "x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", prior={"variance": 5}
     )
-    found = verdicts(growth, ["aof-gauss-hermite"])
-    assert "points an axis in place of 5" in found["aof-gauss-hermite"].says
+    result = verdicts(growth, ["aof-gauss-hermite"])
+    assert "points an axis in place of 5" in result["aof-gauss-hermite"].says
 
 
 def test_a_line_for_each_filter():
-    found = admissions(Model.define("0.9*x + v", "sign(x) + w"), ["duof", "aof-exact"])
-    lines = table(found).splitlines()
+    result = admissions(Model.define("0.9*x + v", "sign(x) + w"), ["duof", "aof-exact"])
+    lines = table(result).splitlines()
     assert lines[0].split() == ["duof", "DUOF", "yes"]
     assert lines[1] == "aof-exact  exact AOF  yes"
 
@@ -113,14 +113,14 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
 
     size, options = (model, 300, 4, 1), {"jobs": 1, "progress": False}
     good = [duof(model), aof(gaussian(model))]
-    found = compare([broken("one"), good[0], broken("two"), good[1]], *size, **options)
-    assert found.names == ("duof", "aof-gaussian") and list(found.left_out) == ["one", "two"]
+    result = compare([broken("one"), good[0], broken("two"), good[1]], *size, **options)
+    assert result.names == ("duof", "aof-gaussian") and list(result.left_out) == ["one", "two"]
     assert (
-        "one became infinite or NaN" in str(found.left_out["one"])
-        and found.left_out["one"].kind == "infinite"
+        "one became infinite or NaN" in str(result.left_out["one"])
+        and result.left_out["one"].kind == "infinite"
     )
     np.testing.assert_array_equal(
-        found.error_variance("duof").value,
+        result.error_variance("duof").value,
         compare(good, *size, **options).error_variance("duof").value,
     )
     with pytest.raises(NotFinite, match="every filter fails"):
@@ -140,9 +140,9 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         filters = lab_filters(model, names)
-    found = compare(filters, *size, **options)
-    assert found.names == names[1:]
+    result = compare(filters, *size, **options)
+    assert result.names == names[1:]
     failed = r"step \d+: mfos-gaussian (failed: a covariance has the variance -|became infinite)"
-    assert re.match(failed, str(found.left_out["mfos-gaussian"]))
+    assert re.match(failed, str(result.left_out["mfos-gaussian"]))
     expected = compare(filters[1:], *size, **options).error_variance("aof-gaussian").value
-    np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
+    np.testing.assert_array_equal(result.error_variance("aof-gaussian").value, expected)

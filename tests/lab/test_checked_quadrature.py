@@ -45,26 +45,26 @@ def checked(model):
     return Structures.of(model).quadrature
 
 
-def laws_of(found, model):
+def laws_of(outcome, model):
     """Posteriors of fresh trajectories: of the AOF, or of each mode's law of the logic-dynamic
     one's as it is merged."""
-    one = (
-        logic_dynamic(found.structures, model, model.first)
+    filter_ = (
+        logic_dynamic(outcome.structures, model, model.first)
         if isinstance(model, JumpModel)
-        else aof(found.structures[0])
+        else aof(outcome.structures[0])
     )
-    return [state.posterior for state in states(one, simulate(model, 12, 6, seed=9).y)[1:]]
+    return [state.posterior for state in states(filter_, simulate(model, 12, 6, seed=9).y)[1:]]
 
 
 @pytest.mark.parametrize("model", [CUBIC, JUMPING], ids=["plain", "modes"])
 def test_the_moments_are_those_of_adaptive_quadrature_at_laws_of_fresh_trajectories(model):
     """The pilot's own laws are others; on these its promise holds too, a root mean square, so four
     times as much for one."""
-    found = checked(model)
-    assert {one.name for one in found.structures} == {"gaussian"} and found.apart <= cq.CLOSE
-    for law in laws_of(found, model):
+    outcome = checked(model)
+    assert {each.name for each in outcome.structures} == {"gaussian"} and outcome.apart <= cq.CLOSE
+    for law in laws_of(outcome, model):
         z, p = law.mean[:, 0], law.cov[:, 0, 0]
-        for tau, theta in (one.predict(*law) for one in found.structures):
+        for tau, theta in (each.predict(*law) for each in outcome.structures):
             for i in range(12):
                 normal = scipy.stats.norm(z[i], np.sqrt(p[i]))
                 first, second = (
@@ -84,11 +84,11 @@ def test_on_the_landing_a_fine_rule_finds_the_same():
     """Three states and noises that the state multiplies: 3 points an axis against 12, at laws of
     fresh trajectories."""
     model = find_variant("J3").model
-    found = checked(model)
-    assert (found.order, checked(model)) == (2, found)  # sought once, as a report asks again
+    outcome = checked(model)
+    assert (outcome.order, checked(model)) == (2, outcome)  # sought once, as a report asks again
     fine = [gauss_hermite(mode, 12) for mode in model.modes]
-    for k, law in enumerate(laws_of(found, model), 1):
-        for less, more in zip(found.structures, fine, strict=True):
+    for k, law in enumerate(laws_of(outcome, model), 1):
+        for less, more in zip(outcome.structures, fine, strict=True):
             (tau, theta), (h, _, F, _) = less.at(k).predict(*law), less.at(k).measure(*law)
             (mean, cov), right = more.at(k).predict(*law), more.at(k).measure(*law)
             for ours, covs, exact, full in (
@@ -118,22 +118,22 @@ def test_a_mode_with_formulas_keeps_them_beside_one_without():
 def test_modes_for_which_no_order_does_leave_the_others_linearised_and_say_so():
     modes = {"sound": {}, "faulty": {"meter": "tan(x) + w"}}
     model = JumpModel.define("0.9*x + v", "x + w", modes=modes, transition=[0.9, 0.1])
-    said = {
-        one.name: one
-        for one in admissions(
+    phrases = {
+        each.name: each
+        for each in admissions(
             model, ["aof-jump-gaussian", "imm", "aof-averaged", "aof-jump-linearised"]
         )
     }
     assert (
-        said["aof-jump-gaussian"].verdict == "no"
-        and "without bound" in said["aof-jump-gaussian"].says
+        phrases["aof-jump-gaussian"].verdict == "no"
+        and "without bound" in phrases["aof-jump-gaussian"].says
     )
     for name in ("imm", "aof-averaged"):
         assert (
-            said[name].verdict == "yes"
-            and "linearised structural functions, as Gaussian ones cannot" in said[name].says
+            phrases[name].verdict == "yes"
+            and "linearised structural functions, as Gaussian ones cannot" in phrases[name].says
         )
-    assert not said["aof-jump-linearised"].says
+    assert not phrases["aof-jump-linearised"].says
 
 
 def test_a_narrower_law_takes_fewer_points():
@@ -193,12 +193,12 @@ def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch, meter, more, name
     call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4"]
     result = CliRunner().invoke(main, [*call, "--report", "ru", "--out", "r", "--json", "r.json"])
     assert result.exit_code == 0, result.output
-    told = next(
+    sentence = next(
         line
         for line in result.output.splitlines()
         if "no closed form: means over normal laws by Gauss-Hermite" in line
     )
-    assert all(title(name) in told.partition(":")[0] for name in names)
+    assert all(title(name) in sentence.partition(":")[0] for name in names)
     numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
     assert not numbers["left_out"] and {*names} <= set(numbers["error_variance"])
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")

@@ -57,7 +57,7 @@ def practitioner_s_track(seed):
 
 def written(path, times, y):
     cells = (
-        ",".join("" if np.isnan(one) else f"{one:.6f}" for one in (t, *row))
+        ",".join("" if np.isnan(each) else f"{each:.6f}" for each in (t, *row))
         for t, row in zip(times, y, strict=True)
     )
     path.write_text(
@@ -107,9 +107,9 @@ def test_the_practitioner_s_track(place):
     assert error(behind.smoothed.mean[:, 0]) < 0.75 * error(behind.estimate.mean[:, 0])
     # and it is what the package's filters give for the model typed in Python
     record = read_measurements(place / "track.csv", variant.model)
-    one = gated(aof(linearised(record.model)), 0.999)
-    np.testing.assert_array_equal(behind.estimate.mean, run(one, record.y).mean)
-    np.testing.assert_array_equal(behind.smoothed.mean, smooth(one, record.y).mean)
+    filter_ = gated(aof(linearised(record.model)), 0.999)
+    np.testing.assert_array_equal(behind.estimate.mean, run(filter_, record.y).mean)
+    np.testing.assert_array_equal(behind.smoothed.mean, smooth(filter_, record.y).mean)
 
 
 def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
@@ -119,9 +119,9 @@ def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
     assert [line.get_rasterized() for line in ax.lines] == [False, True]
     times, _, y = practitioner_s_track(2)
     written(place / "track.csv", times, y)
-    told = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"))
-    passed = told.examined.passed[:, 0, 0]
-    own_data._whiteness(own_data.columns_of(told), "y1", passed, ax)
+    analysis = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"))
+    passed = analysis.examined.passed[:, 0, 0]
+    own_data._whiteness(own_data.columns_of(analysis), "y1", passed, ax)
     assert len(ax.lines[3].get_xdata()) == 20
 
 
@@ -136,17 +136,19 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         and "The gate refused" in result.output
         and "Report: out/report.html" in result.output
     )
-    told = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"), gate=0.999)
+    analysis = estimate_record(
+        place / "track.csv", model_of(place / "my.toml", "plane"), gate=0.999
+    )
     table = numbers(place / "out" / "estimate.csv")
     assert len(table) == 1 + 4 * 4 + 2 * 2 + 2
     for name, column in (
         ("time", times[:60]),
-        ("z", told.examined.estimate.mean[:, 0, 1]),
-        ("u_smoothed_sd", np.sqrt(told.examined.smoothed.cov[:, 0, 2, 2])),
-        ("y2_innovation", told.examined.innovations.value[:, 0, 1]),
-        ("y1_innovation_sd", np.sqrt(told.examined.innovations.cov[:, 0, 0, 0])),
-        ("weight", told.examined.weight[:, 0]),
-        ("log_likelihood", told.examined.log_likelihood[:, 0]),
+        ("z", analysis.examined.estimate.mean[:, 0, 1]),
+        ("u_smoothed_sd", np.sqrt(analysis.examined.smoothed.cov[:, 0, 2, 2])),
+        ("y2_innovation", analysis.examined.innovations.value[:, 0, 1]),
+        ("y1_innovation_sd", np.sqrt(analysis.examined.innovations.cov[:, 0, 0, 0])),
+        ("weight", analysis.examined.weight[:, 0]),
+        ("log_likelihood", analysis.examined.log_likelihood[:, 0]),
     ):
         # the file of measurements has six decimals
         np.testing.assert_allclose(table[name], column, rtol=1e-6, atol=1e-6)
@@ -159,7 +161,7 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         "<math" in html and "<b>" not in html and "a walk &lt;b&gt;in&lt;/b&gt; the plane" in html
     )
     assert not re.search(r"""(src|href)\s*=\s*["']?\s*(https?:)?//""", html)
-    for sentence in told.says():
+    for sentence in analysis.says():
         assert sentence.split(":")[0] in html
 
 
@@ -195,18 +197,18 @@ def test_unknown_parameters_are_found_first(call, place):
     )
     result = call("line.csv", "--model", "mine.toml", "--unknown", "q,r", "--positive", "q, r")
     assert result.exit_code == 0, result.output
-    found = {
+    columns = {
         name: float(value)
         for name, value in re.findall(r"^(q|r) = (\S+) ±", result.output, re.MULTILINE)
     }
-    told = estimate_record(
+    analysis = estimate_record(
         place / "line.csv",
         model_of(place / "mine.toml", None),
         unknown=["q", "r"],
         positive=["q", "r"],
     )
-    assert found == pytest.approx(
-        dict(zip(told.likeliest.names, told.likeliest.value, strict=True)), rel=1e-3
+    assert columns == pytest.approx(
+        dict(zip(analysis.likeliest.names, analysis.likeliest.value, strict=True)), rel=1e-3
     )
     assert (place / "estimate-line" / "estimate.csv").is_file()
     unfit = call("line.csv", "--model", "mine.toml", "--unknown", "x")
@@ -215,15 +217,15 @@ def test_unknown_parameters_are_found_first(call, place):
 
 @pytest.mark.parametrize("structure", [*own_data.STRUCTURES])
 def test_every_filter_of_the_option(place, structure):
-    told = estimate_record(
+    analysis = estimate_record(
         place / "line.csv", model_of(place / "my.toml", "line"), structure=structure
     )
     expected = estimate_record(place / "line.csv", model_of(place / "my.toml", "line"))
     # a linear model
     np.testing.assert_allclose(
-        told.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9
+        analysis.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9
     )
-    assert told.record.model == Model.define(
+    assert analysis.record.model == Model.define(
         "x + dt*v", "x + w", inputs={"dt": [0.5, 1.5, 0.5, 0.5, 0.5]}
     )
 

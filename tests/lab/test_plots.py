@@ -72,10 +72,10 @@ def test_a_figure_draws_on_the_axes_given_labels_them_and_gives_each_filter_its_
 
 def test_a_family_has_one_colour_and_an_approximation_its_dashes():
     for family in ("aof", "fos", "mfos"):
-        one, two = plots.style(f"{family}-gaussian"), plots.style(f"{family}-linearised")
-        assert one["color"] == two["color"]
-        assert one["marker"] == two["marker"]
-        assert one["linestyle"] != two["linestyle"]
+        first, two = plots.style(f"{family}-gaussian"), plots.style(f"{family}-linearised")
+        assert first["color"] == two["color"]
+        assert first["marker"] == two["marker"]
+        assert first["linestyle"] != two["linestyle"]
 
 
 def test_no_two_filters_look_the_same():
@@ -134,7 +134,8 @@ def test_the_colour_blind_tell_filters_of_a_figure_apart(names):
     """By their colours alone, at seven times what is just noticed; each has a marker of its own
     besides."""
     assert (
-        min(apart(look(one)[0], look(other)[0]) for one, other in combinations(names, 2)) > 7 * 2.3
+        min(apart(look(first)[0], look(other)[0]) for first, other in combinations(names, 2))
+        > 7 * 2.3
     )
     assert len({look(name)[1] for name in names if name != "iterated"}) == len(
         {*names} - {"iterated"}

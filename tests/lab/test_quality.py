@@ -49,21 +49,21 @@ def test_a_shipped_variant_is_well_posed(name):
     """In variant 12 the filters differ by a thousandth only, in 53 by a few tails: that takes more
     trajectories to see."""
     vector = SHIPPED[name].model.n > 1  # gets an eighth
-    found = examine(SHIPPED[name], 20_000 if vector or name in ("12", "53") else 4_000)
-    assert found.well_posed, found.faults
-    assert found.linear == (name == "1")
-    assert found.findings["filters differ"].ok == (name != "1")
-    assert 0 < found.findings["observable"].value < 0.5
-    assert ("decays to a constant" in found.remarks) == (name == "53")
-    assert ("linear: the Kalman filter is exact" in found.remarks) == (name == "1")
+    quality_ = examine(SHIPPED[name], 20_000 if vector or name in ("12", "53") else 4_000)
+    assert quality_.well_posed, quality_.faults
+    assert quality_.linear == (name == "1")
+    assert quality_.findings["filters differ"].ok == (name != "1")
+    assert 0 < quality_.findings["observable"].value < 0.5
+    assert ("decays to a constant" in quality_.remarks) == (name == "53")
+    assert ("linear: the Kalman filter is exact" in quality_.remarks) == (name == "1")
 
 
 def test_the_result_does_not_depend_on_the_number_of_processes():
     chosen = [SHIPPED["53"], SHIPPED["1"]]
-    one, two = (list(examine_all(chosen, 512, 3, jobs)) for jobs in (1, 2))
-    assert [found.name for found in one] == ["53", "1"]
-    assert one == two
-    assert one[0].findings["bounded"] != examine(chosen[0], 512, 4).findings["bounded"]
+    first, two = (list(examine_all(chosen, 512, 3, jobs)) for jobs in (1, 2))
+    assert [quality_.name for quality_ in first] == ["53", "1"]
+    assert first == two
+    assert first[0].findings["bounded"] != examine(chosen[0], 512, 4).findings["bounded"]
 
 
 # --- bad variants, each refused for its own reason
@@ -126,22 +126,22 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_a_bad_variant_is_refused_for_its_reason(case):
     body, reasons = BAD[case]
-    found = examine(variant(**body), 2048)
-    assert not found.well_posed
-    assert set(found.faults) == set(reasons)
+    quality_ = examine(variant(**body), 2048)
+    assert not quality_.well_posed
+    assert set(quality_.faults) == set(reasons)
     for criterion, reason in reasons.items():
-        assert re.search(reason, found.faults[criterion])
+        assert re.search(reason, quality_.faults[criterion])
     if "bounded" in reasons:
-        assert "observable" not in found.findings
-        assert "filters differ" not in found.findings
+        assert "observable" not in quality_.findings
+        assert "filters differ" not in quality_.findings
 
 
 def test_long_formulas_are_refused():
     for power, says in ((9, "557 operations"), (10, "693 operations")):
         model = Model.define("0.9*x + v", f"(1 + x)**{power} + w")
-        found = solvable(Structures(model))
-        assert says in found.says and found.ok == ("more than 600" not in found.says)
-        assert found.ok == (power == 9)
+        quality_ = solvable(Structures(model))
+        assert says in quality_.says and quality_.ok == ("more than 600" not in quality_.says)
+        assert quality_.ok == (power == 9)
 
 
 def test_a_filter_diverges_at_ten_times_the_variance_of_the_state():
@@ -155,10 +155,10 @@ def test_a_filter_diverges_at_ten_times_the_variance_of_the_state():
 
 def test_a_derivation_without_end_is_given_up(monkeypatch):
     monkeypatch.setattr(quality, "SECONDS", 1e-3)
-    found = examine(SHIPPED["21"], FEWEST, ask=unposed)
-    assert list(found.faults) == ["solvable"]
-    assert "not found in 0.001 s" in found.faults["solvable"]
-    assert "bounded" not in found.findings
+    quality_ = examine(SHIPPED["21"], FEWEST, ask=unposed)
+    assert list(quality_.faults) == ["solvable"]
+    assert "not found in 0.001 s" in quality_.faults["solvable"]
+    assert "bounded" not in quality_.findings
 
 
 def test_a_variant_whose_questions_cannot_be_posed_is_named_with_the_question():
@@ -198,9 +198,9 @@ def test_infinite_trajectories_are_found_with_their_step(bad):
     x = np.random.default_rng(1).normal(size=(6, 100, 2))
     x[4, 17, 1] = bad
     with np.errstate(over="ignore"):
-        found = bounded(x)
-    assert found.ok is False
-    assert "infinite (step 4)" in found.says
+        quality_ = bounded(x)
+    assert quality_.ok is False
+    assert "infinite (step 4)" in quality_.says
 
 
 # --- observable
@@ -229,8 +229,8 @@ def test_the_share_of_a_linear_variant_is_that_of_the_riccati_equation():
 def test_a_share_that_is_not_known_well_is_not_enough():
     """Behind this meter 0.84 is left: below UNSEEN = 0.9, but by less than four standard errors of
     256 trajectories."""
-    one = variant("0.9*x + 0.3*v", "x + f*w", {"f": 3.5})
-    few, many = (examine(one, runs).findings["observable"] for runs in (256, 8_000))
+    sharp = variant("0.9*x + 0.3*v", "x + f*w", {"f": 3.5})
+    few, many = (examine(sharp, runs).findings["observable"] for runs in (256, 8_000))
     assert few.value < 0.9
     assert not few.ok
     assert many.ok
@@ -361,12 +361,12 @@ def judged(monkeypatch):
 
 def test_candidates_are_rejected_for_each_reason(judged):
     judged(*({name: Finding(False, "")} for name in GOOD))
-    found = generate(3, jobs=1)
-    assert found.rejected == Counter(
+    quality_ = generate(3, jobs=1)
+    assert quality_.rejected == Counter(
         {name: 1 for name in GOOD} | {"linear": 1, "formulas of another one": 1}
     )
-    assert [float(one.model.parameters["c"]) for one in found.variants] == [5, 6, 8]
-    assert [one.name for one in found.variants] == ["g1", "g2", "g3"]
+    assert [float(each.model.parameters["c"]) for each in quality_.variants] == [5, 6, 8]
+    assert [each.name for each in quality_.variants] == ["g1", "g2", "g3"]
 
 
 def test_a_search_without_end_is_given_up_and_formulas_are_seldom_repeated(judged, monkeypatch):
@@ -377,8 +377,10 @@ def test_a_search_without_end_is_given_up_and_formulas_are_seldom_repeated(judge
         lambda *_: {"state": "0.9*x + v", "meter": "x + w", "parameters": {"c": 9}},
     )
     monkeypatch.setattr(grammar, "read_variant", lambda name, *_: name)
-    found = generate(4, jobs=1)
-    assert found.variants == ["g1"] and found.rejected == {"formulas of another one": 4 * 20 - 1}
+    quality_ = generate(4, jobs=1)
+    assert quality_.variants == ["g1"] and quality_.rejected == {
+        "formulas of another one": 4 * 20 - 1
+    }
     assert len(generate(150, jobs=1).variants) == 4
 
 
@@ -412,10 +414,10 @@ def quick(monkeypatch):
     """`generate` without computing: it finds two variants at most."""
 
     def made(wanted, seed, runs, jobs, ask):
-        found = [
+        quality_ = [
             read_variant(f"g{i + 1}", propose(seed, i), "the test") for i in range(min(wanted, 2))
         ]
-        return grammar.Generated(found, Counter({"bounded": 3, "linear": 1}))
+        return grammar.Generated(quality_, Counter({"bounded": 3, "linear": 1}))
 
     monkeypatch.setattr(grammar, "generate", made)
 

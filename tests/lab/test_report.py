@@ -113,13 +113,13 @@ def test_rounding_is_not_a_difference():
         {"DUOF", "GMFOS"},
         {"DUOF", "LMFOS"},
     ]
-    found = [
+    result_ = [
         set(re.findall(r"\w+", s)[:3:2])
         for s in conclusions(result)
         if s.endswith("are the same but for rounding.")
     ]
     ranked = [title(name) for name, _ in result.ranking()]
-    assert found == [pair for pair in map(set, pairwise(ranked)) if pair in alike]
+    assert result_ == [pair for pair in map(set, pairwise(ranked)) if pair in alike]
 
 
 class Told:
@@ -184,35 +184,35 @@ def test_the_conclusion_counts_in_good_language():
 def test_a_filter_that_equals_the_control_but_for_rounding_is_not_told_a_difference(language):
     """IMM beside the logic-dynamic AOF of an object that is affine in every mode: they differ by
     1e-16."""
-    told = Told()
-    told.has_bound, found = False, {"fos-gaussian": -3e-16, "aof-gaussian": 0.0, "duof": 0.3}
-    told.ranking = lambda: [
-        (name, Estimate(np.array(value), np.array(0.01), 9)) for name, value in found.items()
+    stub = Told()
+    stub.has_bound, result_ = False, {"fos-gaussian": -3e-16, "aof-gaussian": 0.0, "duof": 0.3}
+    stub.ranking = lambda: [
+        (name, Estimate(np.array(value), np.array(0.01), 9)) for name, value in result_.items()
     ]
-    report = StudentReport(told, WORDS[language])
+    report = StudentReport(stub, WORDS[language])
     *_, last = report.sentences([Verdict("aof-gaussian", [], "duof")] * 51)
     assert last == report.mean_sentence("mean_first")
     assert report.title("aof-gaussian") in last and "e-" not in last
-    found["fos-gaussian"] = -3e-3
+    result_["fos-gaussian"] = -3e-3
     *_, last = report.sentences([Verdict("aof-gaussian", [], "duof")] * 51)
     assert last == report.mean_sentence("mean_control") and report.title("fos-gaussian") in last
 
 
 @pytest.mark.parametrize("language", ["en", "ru"])
 def test_a_filter_that_diverges_is_no_last_with_a_number(language):
-    told = Told()
-    told.lost = {"fos-gaussian": np.ones(51, dtype=bool)}
-    sentence = StudentReport(told, WORDS[language]).mean_sentence("mean_bound")
+    stub = Told()
+    stub.lost = {"fos-gaussian": np.ones(51, dtype=bool)}
+    sentence = StudentReport(stub, WORDS[language]).mean_sentence("mean_bound")
     assert (
-        told.entrants[1] == "duof"
-        and StudentReport(told, WORDS[language]).title("duof") in sentence
+        stub.entrants[1] == "duof"
+        and StudentReport(stub, WORDS[language]).title("duof") in sentence
     )
-    assert StudentReport(told, WORDS[language]).title("fos-gaussian") not in sentence
-    told.lost |= {"duof": np.ones(51, dtype=bool)}
+    assert StudentReport(stub, WORDS[language]).title("fos-gaussian") not in sentence
+    stub.lost |= {"duof": np.ones(51, dtype=bool)}
     assert (
-        StudentReport(told, WORDS[language])
+        StudentReport(stub, WORDS[language])
         .mean_sentence("mean_bound")
-        .endswith(StudentReport(told, WORDS[language]).title("aof-gaussian") + ".")
+        .endswith(StudentReport(stub, WORDS[language]).title("aof-gaussian") + ".")
     )
 
 
@@ -243,7 +243,7 @@ def test_both_languages_have_the_same_words_with_the_same_places():
     assert set(russian) == set(english)
     places = re.compile(r"(?<!\\mathsf)\{(\w+)(?::([^{}]*))?\}")  # {name}, or {name:word/words}
     for key, text in english.items():
-        here, there = (sorted(places.findall(one)) for one in (text, russian[key]))
+        here, there = (sorted(places.findall(each)) for each in (text, russian[key]))
         assert [name for name, _ in here] == [name for name, _ in there], key
         assert all(words.count("/") == (1 if words else 0) for _, words in here), key
         assert all(words.count("/") == (2 if words else 0) for _, words in there), key
@@ -325,11 +325,11 @@ def test_what_is_written_out_is_the_filter_that_runs(name, kind):
             r"\Psi_{k}": values["\\Psi_{k+1}"],
             "y_{k}": float(measured),
         }
-        for one, formula in scalar_equations(structure):
+        for each, formula in scalar_equations(structure):
             numbers = {
                 s: now[s.name] if s.name in now else model.values[s] for s in formula.free_symbols
             }
-            now[one.name] = values[one.name] = float(formula.subs(numbers))
+            now[each.name] = values[each.name] = float(formula.subs(numbers))
         # rounding of some dozens of operations, in another order
         assert now["z_{k}"] == pytest.approx(expected.mean[k].item(), rel=1e-9, abs=1e-12)
         assert now["p_{k}"] == pytest.approx(expected.cov[k].item(), rel=1e-9)
@@ -357,7 +357,7 @@ def test_a_vector_variant_has_no_scalar_derivation(written):
 def test_figures_speak_the_language_of_the_report(results, language, monkeypatch, tmp_path):
     """Every label, title and legend that is drawn; Cyrillic letters in the Russian report only, and
     no English words there."""
-    said, below, draw = [], [], Figure.savefig
+    texts, below, draw = [], [], Figure.savefig
 
     def listen(figure, *arguments, **options):
         for ax in figure.axes:
@@ -366,8 +366,8 @@ def test_figures_speak_the_language_of_the_report(results, language, monkeypatch
                 if "ranking" in str(arguments[0])
                 else []
             )
-            said.extend([ax.get_xlabel(), ax.get_ylabel(), *rows])
-        said.extend(
+            texts.extend([ax.get_xlabel(), ax.get_ylabel(), *rows])
+        texts.extend(
             text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()
         )
         draw(figure, *arguments, **options)
@@ -378,10 +378,10 @@ def test_figures_speak_the_language_of_the_report(results, language, monkeypatch
     monkeypatch.setattr(Figure, "savefig", listen)
     paths = write_report(VARIANTS["53"], results["53"], tmp_path, language)
     assert below and all(below)
-    plain = " ".join(re.sub(r"\$[^$]*\$", "", text) for text in said)
+    plain = " ".join(re.sub(r"\$[^$]*\$", "", text) for text in texts)
     assert {path.stem for path in paths} == {"report", *FIGURES}
-    assert ("точный АОФ" in said and "ЛМФОС" in said) == (language == "ru")
-    assert ("exact AOF" in said and "LMFOS" in said) == (language == "en")
+    assert ("точный АОФ" in texts and "ЛМФОС" in texts) == (language == "ru")
+    assert ("exact AOF" in texts and "LMFOS" in texts) == (language == "en")
     assert bool(re.search("[а-яА-Я]", plain)) == (language == "ru")
     assert bool(re.search("[a-zA-Z]", plain)) == (language == "en")
 
@@ -457,9 +457,11 @@ def test_one_filter_left(tmp_path):
     """The others are refused: named with their causes, together where they share it; nothing is
     compared, nothing fails."""
     model = Model.define("0.9*x + v", "x + (1 if x > 0 else 0) + sin(w)")
-    found = admissions(model, LAB)
-    reasons = {one.name: one.reason for one in found if one.built is None}
-    result = compare([one.built for one in found if one.built], model, 200, 3, 1, progress=False)
+    result_ = admissions(model, LAB)
+    reasons = {each.name: each.reason for each in result_ if each.built is None}
+    result = compare(
+        [each.built for each in result_ if each.built], model, 200, 3, 1, progress=False
+    )
     result = dataclasses.replace(result, left_out=reasons)
     paths = write_report(Variant("one_left", "", model), result, tmp_path, "ru")
     tex = page_of(tmp_path, "report.tex")
@@ -506,10 +508,10 @@ def test_a_filter_that_a_few_trajectories_take_far_beyond_the_others_is_said_to_
         result.sums.largest[:] = 0
         if not everywhere:
             result.sums.largest[1, 2] = 0.5 * result.sums.square[1, 2].sum()
-        found = " ".join(remarks_in_words(result))
-        assert ("DUOF: at step 2 the error variance is more than a hundred times" in found) == (
+        result_ = " ".join(remarks_in_words(result))
+        assert ("DUOF: at step 2 the error variance is more than a hundred times" in result_) == (
             not everywhere
-        ), found
+        ), result_
         # and it has no place among the others
         assert len(conclusions(result)) == everywhere
         write_report(VARIANTS["53"], result, tmp_path, "ru")

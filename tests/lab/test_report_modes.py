@@ -32,14 +32,14 @@ def carry_out(equations, values):
     for equation in equations:
         arguments = sorted(equation.rhs.free_symbols - {s.n, s.p}, key=str)
         dummies = [
-            sp.MatrixSymbol(f"M{at}", *(size.subs({s.n: 2, s.p: 2}) for size in one.shape))
-            if isinstance(one, sp.MatrixSymbol)
+            sp.MatrixSymbol(f"M{at}", *(size.subs({s.n: 2, s.p: 2}) for size in each.shape))
+            if isinstance(each, sp.MatrixSymbol)
             else sp.Symbol(f"a{at}")
-            for at, one in enumerate(arguments)
+            for at, each in enumerate(arguments)
         ]
         formula = equation.rhs.xreplace(dict(zip(arguments, dummies, strict=True)))
         values[equation.lhs] = sp.lambdify(dummies, formula, "numpy")(
-            *(values[one] for one in arguments)
+            *(values[each] for each in arguments)
         )
 
 
@@ -47,8 +47,8 @@ def test_the_printed_equations_are_the_logic_dynamic_filter():
     """Executed one after the other for two modes and three steps, with structural functions,
     densities and pi put in."""
     structures, y = [gaussian(mode) for mode in MODEL.modes], simulate(MODEL, 1, 3, seed=5).y
-    one = logic_dynamic(structures, MODEL, MODEL.first)
-    state, values = one.init(1), {}
+    filter_ = logic_dynamic(structures, MODEL, MODEL.first)
+    state, values = filter_.init(1), {}
     for j in (1, 2):
         values[vector(r"\lambda", j)], values[square(r"\Psi", j)] = (
             MODEL.prior.mean[:, None],
@@ -62,18 +62,18 @@ def test_the_printed_equations_are_the_logic_dynamic_filter():
         values[s.y] = y[k, 0][:, None]
         for j, structure in enumerate(structures, 1):
             lam, Psi = vector(r"\lambda", j), square(r"\Psi", j)
-            found = structure.measure(values[lam][:, 0], values[Psi])
-            for name, value in (("h", found.h[:, None]), ("G", found.G), ("F", found.F)):
+            values_ = structure.measure(values[lam][:, 0], values[Psi])
+            for name, value in (("h", values_.h[:, None]), ("G", values_.G), ("F", values_.F)):
                 rows, columns = (s.p, {"h": s.ONE, "G": s.n, "F": s.p}[name])
                 values[s.matrix(rf"{name}^{{{j}}}({lam.name}, {Psi.name})", rows, columns)] = value
-            as_ensemble = Measurement(*(part[None] for part in found))
+            as_ensemble = Measurement(*(part[None] for part in values_))
             values[jump_equations.likelihood(j)] = float(np.exp(log_density(as_ensemble, y[k])[0]))
         for j in (1, 2):
             carry_out(jump_equations.correction(j, 2), values)
         carry_out(
             [*jump_equations.combination(1, 2)[:2], *jump_equations.combination(2, 2)[1:]], values
         )
-        state = one.step(state, y[k])
+        state = filter_.step(state, y[k])
         np.testing.assert_allclose(values[s.z][:, 0], state.posterior.mean[0], rtol=1e-10)
         np.testing.assert_allclose(values[s.P], state.posterior.cov[0], rtol=1e-9, atol=1e-12)
         for j, structure in enumerate(structures, 1):
@@ -100,7 +100,7 @@ def written(request, tmp_path_factory):
         "aof-exact",
     ]
     model = find_variant("J1-lasting").model
-    filters = [one.built for one in admissions(model, names)]
+    filters = [each.built for each in admissions(model, names)]
     result = compare(filters, model, 128, 3, 1, progress=False, jobs=1)
     folder = tmp_path_factory.mktemp(request.param)
     paths = write_report(
@@ -136,7 +136,7 @@ def test_it_tells_the_modes_their_chain_and_the_filters_of_the_variant(written):
     }[language]
     assert all(text in of for text in expected for of in (tex, page))
     assert not re.search(r"\{(name|names|values|modes|filters|memory)[:}]", tex)
-    assert all(rf"$\zeta_k = {one}$" in tex for one in ("z_k", r"(y_{k};\,\dots;\,y_{k-\ell+1})"))
+    assert all(rf"$\zeta_k = {each}$" in tex for each in ("z_k", r"(y_{k};\,\dots;\,y_{k-\ell+1})"))
     assert tex.count(r"\zeta_k + \chi^i") == 2
     assert ("<math" in page) and "<script" not in page
 

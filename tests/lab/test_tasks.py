@@ -58,7 +58,7 @@ def test_their_moment_equations_are_those_of_the_note():
         np.testing.assert_allclose(rates, expected, rtol=1e-12)
         h, G, F, _ = gaussian(model).at(0).measure(np.array([z]), np.array([[p]]))
         wanted = [z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + noise]
-        np.testing.assert_allclose([np.squeeze(one) for one in (h, G, F)], wanted, rtol=1e-12)
+        np.testing.assert_allclose([np.squeeze(each) for each in (h, G, F)], wanted, rtol=1e-12)
     for name, noise in (("CD2", 1), ("C2", 10)):
         model = BETWEEN[name].model
         z, p = law(model, 2)
@@ -131,8 +131,8 @@ def test_the_lift_is_switched_at_45_s(name):
     x1 exp(-beta x3)."""
     model = TASKS[name].model
     x = simulate(model, 50, 60, seed=2).x
-    one = model if isinstance(model, Model) else model.modes[0]
-    g0 = float(one.parameters["g0"])
+    mode = model if isinstance(model, Model) else model.modes[0]
+    g0 = float(mode.parameters["g0"])
     speed, angle, height = np.moveaxis(x[..., :3], -1, 0)
     density, lift = (x[..., 3], x[..., 4]) if name == "J4" else (0.0433333, 0.3)
     turned = np.diff(angle, axis=0) - (np.cos(angle) * (speed / (3400 + height) - g0 / speed))[:-1]

@@ -38,7 +38,7 @@ def test_the_shipped_variants():
     printed = {gaussian(variant.model).latex() for variant in SHIPPED.values()}
     assert "" not in titles and len(titles) == len(printed) == len(SHIPPED)
     for variant in SHIPPED.values():
-        assert [one.name for one in lab_filters(variant.model)] == list(LAB)
+        assert [each.name for each in lab_filters(variant.model)] == list(LAB)
         assert has_exact(variant.model) == (variant.model.n == 1)
 
 
@@ -47,8 +47,8 @@ def test_the_shipped_variants():
 
 def test_every_filter_builds_and_carries_its_short_name():
     built = lab_filters(SHIPPED["53"].model, [*FILTERS, "duof"])
-    assert [one.name for one in built] == list(FILTERS)  # and what is asked for twice, once
-    assert all(isinstance(one, Filter | Design) for one in built)
+    assert [each.name for each in built] == list(FILTERS)  # and what is asked for twice, once
+    assert all(isinstance(each, Filter | Design) for each in built)
 
 
 def test_titles_are_distinct():
@@ -150,7 +150,7 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
     assert find_variant("good", path).model == Model.define("0.9*x + v", "x + w")
     with pytest.warns(VariantWarning, match=r"^variant bad in") as warned:
         assert list(load_variants(path)) == ["good"]
-    assert [str(one.message) for one in warned] == [message]
+    assert [str(each.message) for each in warned] == [message]
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_only_the_variants_asked_for_are_built(tmp_path, monkeypatch):
         of_variants, "read_variant", lambda name, *rest: built.append(name) or whole(name, *rest)
     )
     assert find_variant("4711", path).name == "4711" and built == ["4711"]
-    assert [one.name for one in chosen_variants(["7", "3", "7"], False, path)] == [
+    assert [each.name for each in chosen_variants(["7", "3", "7"], False, path)] == [
         "7",
         "3",
     ] and built[1:] == ["7", "3"]

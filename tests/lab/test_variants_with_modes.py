@@ -25,7 +25,9 @@ from kfcourse.lab.variants import (
 )
 from kfcourse.montecarlo.modes import recognised
 
-JUMPS = {name: one for name, one in read_variants()[0].items() if isinstance(one.model, JumpModel)}
+JUMPS = {
+    name: each for name, each in read_variants()[0].items() if isinstance(each.model, JumpModel)
+}
 OWN = """
 [variants.mine]
 state = "0.9*x + v"
@@ -41,7 +43,7 @@ meter = "x + w"
 
 
 def kfcourse(*arguments):
-    return CliRunner().invoke(cli.main, [str(one) for one in arguments])
+    return CliRunner().invoke(cli.main, [str(each) for each in arguments])
 
 
 @pytest.fixture
@@ -57,22 +59,24 @@ def test_they_are_shipped_beside_the_variants_that_the_exercises_ask_about(own):
     assert list(load_variants(own)) == ["plain"] and isinstance(
         find_variant("mine", own).model, JumpModel
     )
-    assert [one.name for one in chosen_variants([], True, own)] == ["plain"]
+    assert [each.name for each in chosen_variants([], True, own)] == ["plain"]
 
 
 @pytest.mark.parametrize("name", JUMPS)
 def test_each_has_its_filters_and_finite_trajectories(name):
-    found = {one.name: one for one in admissions(JUMPS[name].model)}
+    outcome = {each.name: each for each in admissions(JUMPS[name].model)}
     if name in ("J3", "J4"):
-        assert "no noise enters the object" in str(found["aof-exact"].reason)
+        assert "no noise enters the object" in str(outcome["aof-exact"].reason)
     else:
-        assert found["aof-exact"].built is not None
-        assert (JUMPS[name].model.n == 1) or "by particles" in found["aof-exact"].says
-    assert all(found[one].built for one in ("aof-jump-linearised", "imm", "gpb2"))
-    for one in ("aof-averaged", "duof", "fos-averaged", "mfos-averaged", "fos-jump-gaussian"):
-        reason = str(found[one].reason)
-        assert found[one].built or "closed" in reason or "nobody knows the probabilities" in reason
-        assert (found["duof"].built is None) == JUMPS[name].model.by_state
+        assert outcome["aof-exact"].built is not None
+        assert (JUMPS[name].model.n == 1) or "by particles" in outcome["aof-exact"].says
+    assert all(outcome[each].built for each in ("aof-jump-linearised", "imm", "gpb2"))
+    for each in ("aof-averaged", "duof", "fos-averaged", "mfos-averaged", "fos-jump-gaussian"):
+        reason = str(outcome[each].reason)
+        assert (
+            outcome[each].built or "closed" in reason or "nobody knows the probabilities" in reason
+        )
+        assert (outcome["duof"].built is None) == JUMPS[name].model.by_state
     assert np.isfinite(simulate(JUMPS[name].model, 200, 51, seed=1).x).all()
 
 
@@ -115,9 +119,9 @@ def test_listed_and_checked(own):
 
 
 def test_filters_are_told_for_modes():
-    told = kfcourse("filters", "J1").output
-    assert "LD-GAOF" in told and "GPB2" in told and "particle" not in told
-    assert "LD-GFKP4" in told and "LD-LFBP4" in told
+    printed = kfcourse("filters", "J1").output
+    assert "LD-GAOF" in printed and "GPB2" in printed and "particle" not in printed
+    assert "LD-GFKP4" in printed and "LD-LFBP4" in printed
     assert title("fbp2-jump-linearised") == "LD-LFBP2"
     wrong = kfcourse("lab", "J1", "--filters", "aof-gaussian")
     assert (
@@ -189,20 +193,20 @@ def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
 
 def test_the_share_of_right_modes_is_that_of_the_trajectories():
     model = JUMPS["J1-lasting"].model
-    one = logic_dynamic(Structures(model).gaussian, model.transition_at, model.first)
-    found = recognised([one, pointmass(model), particle(model, 10)], model, 160, 8, 4)
+    filter_ = logic_dynamic(Structures(model).gaussian, model.transition_at, model.first)
+    outcome = recognised([filter_, pointmass(model), particle(model, 10)], model, 160, 8, 4)
     _, y, mode = simulate(model, 160, 8, 4)
-    state, right = one.init(160), []
+    state, right = filter_.init(160), []
     for k in range(8):
-        state = one.step(state, y[k])
+        state = filter_.step(state, y[k])
         right.append((state.memory.probability[:, 1] > 0.5) == (mode[k] == 1))
-    assert found.share[one.name].value == pytest.approx(np.mean(right), abs=1e-12)
-    assert found.guess == pytest.approx((mode == 0).mean(), abs=1e-12)
+    assert outcome.share[filter_.name].value == pytest.approx(np.mean(right), abs=1e-12)
+    assert outcome.guess == pytest.approx((mode == 0).mean(), abs=1e-12)
     shown = next(k for k in range(20) if 0 < mode[:, k].mean() < 1)  # the first with both modes
-    np.testing.assert_array_equal(found.mode, mode[:, shown])
-    assert found.probability[one.name].shape == (8, 2)
+    np.testing.assert_array_equal(outcome.mode, mode[:, shown])
+    assert outcome.probability[filter_.name].shape == (8, 2)
     # particles are slow
-    assert [one.freedom + 1 for one in found.share.values()] == [160, 160, 20]
+    assert [filter_.freedom + 1 for filter_ in outcome.share.values()] == [160, 160, 20]
 
 
 def test_the_chapter_shows_the_shipped_table():

@@ -26,19 +26,19 @@ def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, vari
     A process that compiles the exact filter and one that finds it compiled round differently: 1e-15
     of an estimate, 1e-10 of the filter's own error, which is a small difference of two.
     """
-    one, lost = aof(gaussian(variant53)), tmp_path / "lost"
+    gaof, lost = aof(gaussian(variant53)), tmp_path / "lost"
 
     def step(state, y):
         try:
             lost.touch(exist_ok=False)
         except FileExistsError:
-            return one.step(state, y)
+            return gaof.step(state, y)
         os._exit(1)
 
     filters = [*lab_filters(variant53, LAB[1:]), pointmass(variant53)]
-    here = compare([one, *filters], variant53, 200, 3, 1, jobs=1, progress=False)
+    here = compare([gaof, *filters], variant53, 200, 3, 1, jobs=1, progress=False)
     there = compare(
-        [replace(one, step=step), *filters], variant53, 200, 3, 1, dask=address, progress=False
+        [replace(gaof, step=step), *filters], variant53, 200, 3, 1, dask=address, progress=False
     )
     assert lost.exists()
     for name, sums, others in zip(here.sums._fields, here.sums, there.sums, strict=True):

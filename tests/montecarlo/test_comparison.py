@@ -55,12 +55,12 @@ RUNS, STEPS, SEED = 6000, 4, 5
 @pytest.fixture(scope="module")
 def direct(linear):
     """The comparison, and errors and covariances of each trajectory kept beside it."""
-    one = Gaussian(np.zeros(2), np.eye(2))
-    wrong = replace(linear, prior=Gaussian(np.zeros(2), 9 * np.eye(2)), meter_noise=one)
+    single = Gaussian(np.zeros(2), np.eye(2))
+    wrong = replace(linear, prior=Gaussian(np.zeros(2), 9 * np.eye(2)), meter_noise=single)
     filters = [aof(gaussian(linear)), duof(linear), replace(kalman_filter(wrong), name="wrong")]
     result = compare(filters, linear, RUNS, STEPS, SEED, same_ensemble=True, progress=False)
     x, y = stored(linear, RUNS, STEPS, SEED)
-    laws = {one.name: run(one, y) for one in (filters[0], filters[2])}
+    laws = {single.name: run(single, y) for single in (filters[0], filters[2])}
     return result, {name: (x - estimate.mean, estimate.cov) for name, estimate in laws.items()}
 
 
@@ -69,10 +69,13 @@ def jackknife(function, *values):
     batch by batch left out."""
     batch = np.repeat(np.arange(BATCHES), batch_sizes(RUNS))
     without = np.array(
-        [function(*(one[..., batch != b].mean(axis=-1) for one in values)) for b in range(BATCHES)]
+        [
+            function(*(value[..., batch != b].mean(axis=-1) for value in values))
+            for b in range(BATCHES)
+        ]
     )
     error = np.sqrt((BATCHES - 1) / BATCHES * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
-    return function(*(one.mean(axis=-1) for one in values)), error
+    return function(*(value.mean(axis=-1) for value in values)), error
 
 
 def agree(estimate, function, *values):
@@ -154,12 +157,12 @@ def test_intervals_are_student_s(direct):
 def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors
     around 190."""
-    one = kalman_filter(linear)
-    truth = float(np.trace(one.step(one.init(1), np.zeros((1, 2))).posterior.cov))
+    single = kalman_filter(linear)
+    truth = float(np.trace(single.step(single.init(1), np.zeros((1, 2))).posterior.cov))
     hits = 0
     for seed in range(200):
         low, high = (
-            compare([one], linear, 400, 1, seed, jobs=1, progress=False)
+            compare([single], linear, 400, 1, seed, jobs=1, progress=False)
             .error_variance("kalman")
             .interval(0.95)
         )
@@ -383,7 +386,7 @@ def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
         }
         result = by_hand(variant53, squares)
         assert [name for name, _ in result.ranking()] == ["best", "also", "same"]
-        assert [(one.best, one.worst) for one in result.verdicts()] == [
+        assert [(single.best, single.worst) for single in result.verdicts()] == [
             ("best", "same")
         ] * result.steps
         assert result.leaders(0) == ["best"]
@@ -471,15 +474,15 @@ def test_the_table_of_the_page_is_reproduced(repeated, k):
 
 
 def test_a_printed_comparison_says_what_to_ask(variant53):
-    found = compare(
+    outcome = compare(
         [aof(gaussian(variant53)), pointmass(variant53)], variant53, 100, 2, 7,
         smoothers=[aof(gaussian(variant53))], progress=False,
     )  # fmt: skip
-    heading, asked = str(found).splitlines()
+    heading, asked = str(outcome).splitlines()
     assert heading == "Comparison of aof-gaussian, aof-exact: 2 steps, 100 trajectories, seed 7"
     for name in re.findall(r"(\w+)\(", asked):
-        assert callable(getattr(found, name))
-    without = replace(found, left_out={"aof-exact": "too slow"})
+        assert callable(getattr(outcome, name))
+    without = replace(outcome, left_out={"aof-exact": "too slow"})
     assert str(without).splitlines()[1] == "left out: aof-exact, too slow"
 
 
@@ -502,6 +505,6 @@ def test_means_over_no_steps():
     with pytest.raises(ValueError, match="none of the 4 steps"):
         result.ranking(slice(4, None))
     object.__setattr__(result, "doubtful", np.array([True, True, False, False]))
-    none, some = (result.mean_gap("aof-linearised", slice(k)) for k in (2, 3))
+    none, three = (result.mean_gap("aof-linearised", slice(k)) for k in (2, 3))
     assert np.isnan(none.value) and np.isnan(none.standard_error)
-    assert some.value == result.gap("aof-linearised").value[2]
+    assert three.value == result.gap("aof-linearised").value[2]

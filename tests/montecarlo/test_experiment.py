@@ -27,9 +27,9 @@ SIGMA = 4  # standard errors: one chance in 16 000 a comparison
 def lab_of(model):
     structures = [gaussian(model), linearised(model)]
     return [
-        *(aof(one) for one in structures),
+        *(aof(each) for each in structures),
         duof(model),
-        *(family(one) for family in (fos, mfos) for one in structures),
+        *(family(each) for family in (fos, mfos) for each in structures),
     ]
 
 
@@ -65,8 +65,8 @@ def test_ensembles_side_by_side_are_those_alone(variant53):
     ensembles = [Ensemble(variant53, *part) for part in ((3, 6, seeds[0]), (5, 6, seeds[1]))]
     together = list(side_by_side(ensembles))
     for here, ensemble in zip((slice(3), slice(3, 8)), ensembles, strict=True):
-        for one, both in zip(ensemble, together, strict=True):
-            for alone, side in zip(one[:3], both[:3], strict=True):
+        for each, both in zip(ensemble, together, strict=True):
+            for alone, side in zip(each[:3], both[:3], strict=True):
                 np.testing.assert_array_equal(side[here], alone)
 
 
@@ -127,9 +127,9 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
     def peak(steps):
         tracemalloc.start()
         compare(filters, variant53, runs, steps, seed=1, jobs=1, progress=False)
-        found = tracemalloc.get_traced_memory()[1]
+        outcome = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        return found
+        return outcome
 
     peak(4)  # what is compiled and cached once
     # The sums: 2 filters x 60 more steps x 6 statistics x 64 batches x 8 bytes = 0.4 MB;
@@ -192,20 +192,26 @@ def test_a_diverging_filter_is_named():
 
 
 def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
-    y, one = simulate(variant53, 1, 5, seed=1).y, aof(gaussian(variant53))
+    y, scalar = simulate(variant53, 1, 5, seed=1).y, aof(gaussian(variant53))
     for given in (y[:, 0, 0], y[:, 0, 0].tolist()):
-        for found, expected in zip(run(one, given), run(one, y), strict=True):
-            np.testing.assert_array_equal(found, expected)
+        for outcome, expected in zip(run(scalar, given), run(scalar, y), strict=True):
+            np.testing.assert_array_equal(outcome, expected)
     missing = np.where(np.arange(5) == 2, np.nan, y[:, 0, 0])
-    np.testing.assert_array_equal(run(one, missing).mean, run(one, missing[:, None, None]).mean)
+    np.testing.assert_array_equal(
+        run(scalar, missing).mean, run(scalar, missing[:, None, None]).mean
+    )
 
     pair = aof(gaussian(vector))
     for filter_, measurements, message in (
-        (one, np.zeros((5, 4)), r"\(5, 4\); of two axes give y\[:, None, :\] .* y\[:, :, None\]"),
+        (
+            scalar,
+            np.zeros((5, 4)),
+            r"\(5, 4\); of two axes give y\[:, None, :\] .* y\[:, :, None\]",
+        ),
         (pair, np.zeros(5), r"must have the shape \(steps, runs, 2\), got \(5,\)"),
-        (one, np.zeros((5, 1, 2)), "expects 1 measurement component"),
-        (one, [], r"no measurements to run over.* is \(0, 1, 1\)$"),
-        (one, [0.1, -np.inf], "step 1, run 0 is infinite; write NaN where one is missing"),
+        (scalar, np.zeros((5, 1, 2)), "expects 1 measurement component"),
+        (scalar, [], r"no measurements to run over.* is \(0, 1, 1\)$"),
+        (scalar, [0.1, -np.inf], "step 1, run 0 is infinite; write NaN where one is missing"),
     ):
         for use in (run, predictions, smooth, likelihood):
             with pytest.raises(ValueError, match=message):
@@ -218,8 +224,8 @@ def test_a_design_that_is_run_says_what_to_do(variant53):
         TypeError, match=r"got Design duof: .*design\(\.\.\.\) makes one of a design"
     ):
         run(duof(variant53), y)
-    one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
-    assert np.isfinite(run(one, y).mean).all()
+    each = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
+    assert np.isfinite(run(each, y).mean).all()
 
 
 def test_each_batch_of_a_comparison_has_particles_of_its_own(vector):

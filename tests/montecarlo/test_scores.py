@@ -70,7 +70,7 @@ def test_a_slow_loop():
     seeds = np.random.SeedSequence(4).spawn(65)[1:]
     sizes = zip(batch_sizes(66), seeds, strict=True)
     batches = [Ensemble(model, size, 2, seed) for size, seed in sizes]
-    y = np.stack([one.y for one in side_by_side(batches)])
+    y = np.stack([each.y for each in side_by_side(batches)])
     law, norm = scipy.stats.multivariate_normal, scipy.stats.norm
     wanted = []
     for k, state in enumerate(states(filters[0], y)[:-1]):
@@ -88,7 +88,7 @@ def test_a_slow_loop():
             sizes.append(s @ normal_crps)
         wanted.append((np.mean(logs), np.mean(sizes)))
     ours = compared.log_score("aof-linearised"), compared.crps("aof-linearised")
-    np.testing.assert_allclose([one.value for one in ours], np.transpose(wanted), rtol=1e-6)
+    np.testing.assert_allclose([each.value for each in ours], np.transpose(wanted), rtol=1e-6)
     # the first prediction is the same for all: the prior, by the Gaussian functions
     h, _, F, _ = normal.at(0).measure(*model.prior)
     assert compared.log_score("duof").value[0] == pytest.approx(law(h, F).logpdf(y[0]).mean())

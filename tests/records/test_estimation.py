@@ -14,18 +14,18 @@ pytestmark = pytest.mark.quick
 
 
 def test_the_nile_s_variances():
-    found = estimate(
+    estimated = estimate(
         local_level(3000, 3000),
         nile(),
         ["q", "r"],
         ["q", "r"],
-        build=lambda one: aof(linearised(one)),
+        build=lambda each: aof(linearised(each)),
     )
     # five digits are published
-    np.testing.assert_allclose(found.value, [1468.5, 15099.7], rtol=5e-5)
-    assert found.log_likelihood == pytest.approx(-641.5856, abs=5e-5)
-    assert found.flat == ()
-    assert float(found.model.parameters["q"]) == found.value[0]
+    np.testing.assert_allclose(estimated.value, [1468.5, 15099.7], rtol=5e-5)
+    assert estimated.log_likelihood == pytest.approx(-641.5856, abs=5e-5)
+    assert estimated.flat == ()
+    assert float(estimated.model.parameters["q"]) == estimated.value[0]
 
 
 def test_a_variance_alone_has_its_closed_form():
@@ -36,10 +36,10 @@ def test_a_variance_alone_has_its_closed_form():
     )
     y = 0.5 + 3 * np.random.default_rng(1).standard_normal((40, 5, 1))
     y[3, 2] = y[7, 1] = np.nan
-    found = estimate(model, y, ["r"], ["r"])
+    estimated = estimate(model, y, ["r"], ["r"])
     expected = np.nanmean((y - 0.5) ** 2)
-    assert found.value[0] == pytest.approx(expected, rel=1e-6)
-    assert found.standard_error[0] == pytest.approx(expected * np.sqrt(2 / 198), rel=1e-5)
+    assert estimated.value[0] == pytest.approx(expected, rel=1e-6)
+    assert estimated.standard_error[0] == pytest.approx(expected * np.sqrt(2 / 198), rel=1e-5)
 
 
 @pytest.mark.parametrize("start", [1.0, 3.0])
@@ -50,11 +50,13 @@ def test_a_direction_that_is_not_told_is_named_whole(start):
         "0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0}
     )
     y = simulate(model, 1, 60, seed=1).y
-    found = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
+    estimated = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
     assert (
-        len(found.flat) == 1 and "does not tell g (" in found.flat[0] and ", q (" in found.flat[0]
+        len(estimated.flat) == 1
+        and "does not tell g (" in estimated.flat[0]
+        and ", q (" in estimated.flat[0]
     )
-    assert np.isinf(found.standard_error).all()
+    assert np.isinf(estimated.standard_error).all()
 
 
 def test_what_the_record_does_not_tell_is_named():
@@ -64,20 +66,20 @@ def test_what_the_record_does_not_tell_is_named():
         "0.9*x + s*v", "g*x + r*w", {"g": 1.5, "s": 0.4, "r": 0.3}, prior={"mean": 0, "variance": 0}
     )
     y = simulate(model, 2, 30, seed=4).y
-    found = estimate(model, y, ["g", "s", "r"], ["g", "s", "r"])
-    (sentence,) = found.flat
+    estimated = estimate(model, y, ["g", "s", "r"], ["g", "s", "r"])
+    (sentence,) = estimated.flat
     assert sentence in {
         "the record does not tell g (+1), s (-1) apart: changed together in these proportions "
         "they leave its likelihood as it is",
         "the record does not tell g (-1), s (+1) apart: changed together in these proportions "
         "they leave its likelihood as it is",
     }
-    np.testing.assert_array_equal(np.isinf(found.standard_error), [True, True, False])
+    np.testing.assert_array_equal(np.isinf(estimated.standard_error), [True, True, False])
     # with one of them known, the other and r are what they are with both free
     alone = estimate(model, y, ["s", "r"], ["s", "r"])
     assert alone.flat == ()
-    assert found.value[0] * found.value[1] == pytest.approx(1.5 * alone.value[0], rel=1e-4)
-    assert found.standard_error[2] == pytest.approx(alone.standard_error[1], rel=1e-3)
+    assert estimated.value[0] * estimated.value[1] == pytest.approx(1.5 * alone.value[0], rel=1e-4)
+    assert estimated.standard_error[2] == pytest.approx(alone.standard_error[1], rel=1e-3)
 
 
 def test_how_little_information_is_none():
@@ -98,11 +100,11 @@ def test_how_little_information_is_none():
 
 def test_a_profile_is_the_best_over_the_others():
     values = [900.0, 1468.5, 2500.0]
-    found = profile(local_level(), nile(), ["q", "r"], "q", values, ["q", "r"])
-    assert found[1] == pytest.approx(-641.5856, abs=5e-5)
-    assert (found[[0, 2]] < found[1]).all()
+    estimated = profile(local_level(), nile(), ["q", "r"], "q", values, ["q", "r"])
+    assert estimated[1] == pytest.approx(-641.5856, abs=5e-5)
+    assert (estimated[[0, 2]] < estimated[1]).all()
     elsewhere = estimate(local_level(q=2500, r=10000), nile(), ["r"], ["r"])
-    assert elsewhere.log_likelihood == pytest.approx(found[2], abs=1e-6)
+    assert elsewhere.log_likelihood == pytest.approx(estimated[2], abs=1e-6)
     alone = profile(local_level(), nile(), ["q"], "q", [1468.5])
     assert alone[0] == pytest.approx(-641.5856, abs=5e-5)
 

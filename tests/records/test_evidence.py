@@ -24,17 +24,18 @@ FILTERS = {
 def test_on_a_linear_model_it_is_the_density_of_the_whole_record(kind):
     """Matrices that change with the step, noises with means and correlations, whole measurements
     and components missing."""
-    one = oracles.Changing()
-    y = simulate(one.model(), 3, 8, seed=3).y.copy()
+    changing = oracles.Changing()
+    y = simulate(changing.model(), 3, 8, seed=3).y.copy()
     y[2, 1] = y[4, 2, 0] = y[7, 2, 1] = y[0, 1] = np.nan
-    found = likelihood(FILTERS[kind](one.model()), y)
-    assert found.shape == (8, 3)
-    assert found[2, 1] == found[0, 1] == 0
+    logs = likelihood(FILTERS[kind](changing.model()), y)
+    assert logs.shape == (8, 3)
+    assert logs[2, 1] == logs[0, 1] == 0
     expected = [
-        oracles.joint_posterior(one.steps(8), one.laws["prior"], y[:, i])[2] for i in range(3)
+        oracles.joint_posterior(changing.steps(8), changing.laws["prior"], y[:, i])[2]
+        for i in range(3)
     ]
     # a 16 x 16 determinant against eight of 2 x 2
-    np.testing.assert_allclose(found.sum(axis=0), expected, rtol=1e-11)
+    np.testing.assert_allclose(logs.sum(axis=0), expected, rtol=1e-11)
 
 
 # ---------------------------------------------------------------- the exact filter, and particles

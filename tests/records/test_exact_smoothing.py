@@ -20,11 +20,11 @@ pytestmark = pytest.mark.quick
 ROUNDING = 1e-9
 
 
-def off(found, expected):
+def off(smoothed, expected):
     """Means in standard deviations, and variances, relative: (steps, runs)."""
     sd = np.sqrt(expected.cov[..., 0, 0])
-    return np.abs(found.mean[..., 0] - expected.mean[..., 0]) / sd, np.abs(
-        found.cov / expected.cov - 1
+    return np.abs(smoothed.mean[..., 0] - expected.mean[..., 0]) / sd, np.abs(
+        smoothed.cov / expected.cov - 1
     )[..., 0, 0]
 
 
@@ -35,13 +35,13 @@ def test_on_a_linear_model_it_is_the_smoother_of_rauch_tung_and_striebel(e):
     model = Model.define("0.95*x + (1 + k/10)*e*v + 0.1", "x + k/20 + 0.5*w", {"e": e})
     y = simulate(model, 6, 12, seed=2).y.copy()
     y[4:7, 3] = y[0, 1] = y[-1, 2] = np.nan
-    one, expected = pointmass(model, accuracy=1e-6), smooth(kalman_filter(model), y)
-    mean, variance = off(smooth(one, y), expected)
-    error = smoothing_error(one, y) / np.sqrt(expected.cov[..., 0, 0])
+    filter_, expected = pointmass(model, accuracy=1e-6), smooth(kalman_filter(model), y)
+    mean, variance = off(smooth(filter_, y), expected)
+    error = smoothing_error(filter_, y) / np.sqrt(expected.cov[..., 0, 0])
     assert error.max() < 1e-4  # 24 integrals of 1e-6, some to better than that
     assert (mean <= error + ROUNDING).all()
     assert (variance <= 3 * error + ROUNDING).all()
-    assert np.abs(smooth(one, y).mean - run(one, y).mean)[:-1].max() > 0.01
+    assert np.abs(smooth(filter_, y).mean - run(filter_, y).mean)[:-1].max() > 0.01
 
 
 def brute_force(y, prior, move, spread, see, noise, means, sds):
@@ -63,11 +63,11 @@ def brute_force(y, prior, move, spread, see, noise, means, sds):
     density /= density.sum()
     edges = max(density.take(i, axis=axis).sum() for axis in range(3) for i in (0, -1))
     masses = [density.sum(axis=tuple({0, 1, 2} - {k})) for k in range(3)]
-    found = np.array([mass @ axis for mass, axis in zip(masses, axes, strict=True)])
+    smoothed = np.array([mass @ axis for mass, axis in zip(masses, axes, strict=True)])
     return (
-        found,
+        smoothed,
         np.array(
-            [mass @ (axis - m) ** 2 for mass, axis, m in zip(masses, axes, found, strict=True)]
+            [mass @ (axis - m) ** 2 for mass, axis, m in zip(masses, axes, smoothed, strict=True)]
         ),
         edges,
     )
@@ -98,17 +98,17 @@ def test_it_is_the_posterior_of_the_whole_trajectory(name, missing):
     y = simulate(model, 5, 3, seed=3).y.copy()
     if missing is not None:
         y[missing] = np.nan
-    one = pointmass(model)
-    found, error = smooth(one, y), smoothing_error(one, y)
+    filter_ = pointmass(model)
+    smoothed, error = smooth(filter_, y), smoothing_error(filter_, y)
     for i in range(5):
-        sds = np.sqrt(found.cov[:, i, 0, 0])
-        mean, variance, edges = brute_force(y[:, i, 0], *known(model), found.mean[:, i, 0], sds)
+        sds = np.sqrt(smoothed.cov[:, i, 0, 0])
+        mean, variance, edges = brute_force(y[:, i, 0], *known(model), smoothed.mean[:, i, 0], sds)
         assert edges < 1e-8
         # what the cube leaves out
-        assert (np.abs(found.mean[:, i, 0] - mean) <= error[:, i] + 1e-6 * sds).all()
+        assert (np.abs(smoothed.mean[:, i, 0] - mean) <= error[:, i] + 1e-6 * sds).all()
         # the accuracy asked for is 1e-3
-        np.testing.assert_allclose(found.cov[:, i, 0, 0], variance, rtol=1e-4)
-    assert error.max() < 1e-3 * np.sqrt(found.cov.max())
+        np.testing.assert_allclose(smoothed.cov[:, i, 0, 0], variance, rtol=1e-4)
+    assert error.max() < 1e-3 * np.sqrt(smoothed.cov.max())
 
 
 def test_a_record_that_contradicts_the_model_is_right_or_refused():
@@ -116,11 +116,11 @@ def test_a_record_that_contradicts_the_model_is_right_or_refused():
     filter has the truth."""
     refused, model = [], Model.define("x + 0.1*v", "x + 0.5*w")
     for first, level in itertools.product((np.nan, 0.0), np.arange(4.0, 12.0)):
-        y, one = np.array([first, *4 * [level]])[:, None, None], pointmass(model)
+        y, filter_ = np.array([first, *4 * [level]])[:, None, None], pointmass(model)
         expected = smooth(kalman_filter(model), y)
         try:
-            mean, _ = off(smooth(one, y), expected)
-            stated = smoothing_error(one, y) / np.sqrt(expected.cov[..., 0, 0])
+            mean, _ = off(smooth(filter_, y), expected)
+            stated = smoothing_error(filter_, y) / np.sqrt(expected.cov[..., 0, 0])
         except Unresolved:
             refused.append(level)
             continue
@@ -131,17 +131,17 @@ def test_a_record_that_contradicts_the_model_is_right_or_refused():
 @pytest.mark.parametrize("lag", [0, 1])
 def test_with_a_lag_it_is_the_posterior_of_a_shorter_record(lag):
     """Of the whole of it; the filter's own is the lag 0."""
-    one = pointmass(MODELS["curved"])
-    y = simulate(one.model, 4, 4, seed=6).y
-    found, error = smooth(one, y, lag), smoothing_error(one, y, lag)
+    filter_ = pointmass(MODELS["curved"])
+    y = simulate(filter_.model, 4, 4, seed=6).y
+    smoothed, error = smooth(filter_, y, lag), smoothing_error(filter_, y, lag)
     for k in range(4):
-        shorter = smooth(one, y[: k + lag + 1])
-        assert (abs(found.mean[k] - shorter.mean[k])[:, 0] <= 2 * error[k] + ROUNDING).all()
+        shorter = smooth(filter_, y[: k + lag + 1])
+        assert (abs(smoothed.mean[k] - shorter.mean[k])[:, 0] <= 2 * error[k] + ROUNDING).all()
         # the accuracy asked for is 1e-3
-        np.testing.assert_allclose(found.cov[k], shorter.cov[k], rtol=1e-4)
-    later = smooth(one, y).mean
-    assert np.abs(found.mean - later)[0].min() > 0.01
-    np.testing.assert_array_equal(found.mean[3 - lag :], later[3 - lag :])
+        np.testing.assert_allclose(smoothed.cov[k], shorter.cov[k], rtol=1e-4)
+    later = smooth(filter_, y).mean
+    assert np.abs(smoothed.mean - later)[0].min() > 0.01
+    np.testing.assert_array_equal(smoothed.mean[3 - lag :], later[3 - lag :])
 
 
 @pytest.fixture(scope="module")
@@ -154,17 +154,17 @@ def test_particles_look_back_as_well_as_they_say(plane):
     y = simulate(plane, 60, 10, seed=1).y.copy()
     y[4, :9] = np.nan
     expected = smooth(kalman_filter(plane), y)
-    one = particle(plane, 1000, seed=1)
-    found, error = smooth(one, y), smoothing_error(one, y)
-    away = np.linalg.norm(found.mean - expected.mean, axis=-1)
+    filter_ = particle(plane, 1000, seed=1)
+    smoothed, error = smooth(filter_, y), smoothing_error(filter_, y)
+    away = np.linalg.norm(smoothed.mean - expected.mean, axis=-1)
     # 600 distances, half of them those of two clouds: root mean squares good to some 5 %, steps
     # dependent
     assert np.sqrt(np.mean(away**2)) == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.2)
     assert np.sqrt(np.mean(away[:-1] ** 2)) < 0.3 * np.sqrt(
-        np.mean((run(one, y).mean - found.mean)[:-1] ** 2)
+        np.mean((run(filter_, y).mean - smoothed.mean)[:-1] ** 2)
     )
     ratio = (
-        np.trace(found.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)
+        np.trace(smoothed.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)
     ).mean(axis=1)
     # 60 covariances of 1,000 particles, of which a few hundred count
     assert np.abs(ratio - 1).max() < 0.08
@@ -186,17 +186,17 @@ def test_smoothers_are_compared_with_the_exact_one():
     gaof, exact = aof(gaussian(model)), pointmass(model)
     smoothers = gaof, aof(linearised(model)), exact
     both = compare([gaof, exact], model, 400, 4, seed=1, smoothers=smoothers, progress=False)
-    found = both.smoothing
-    assert found.names == ("aof-gaussian", "aof-linearised", "aof-exact")
+    smoothed = both.smoothing
+    assert smoothed.names == ("aof-gaussian", "aof-linearised", "aof-exact")
     # after the last measurement nothing comes; on the same trajectories
-    last = found.bound()[3], both.bound()[3]
+    last = smoothed.bound()[3], both.bound()[3]
     assert last[0].value == pytest.approx(last[1].value, rel=1e-3)
-    assert (found.bound().value[:-1] < 0.9 * both.bound().value[:-1]).all()
-    gap = found.gap("aof-gaussian")
+    assert (smoothed.bound().value[:-1] < 0.9 * both.bound().value[:-1]).all()
+    gap = smoothed.gap("aof-gaussian")
     # the Gaussian smoother's known weakness: 44 % above the exact one at the first step, where its
     # filter is 4 % above
     assert gap.value[0] - 4 * gap.standard_error[0] > 0.2
     # what `smooth` gives is what is compared
     x, y = simulate(model, 400, 4, seed=5)
     by_hand = ((smooth(gaof, y).mean - x) ** 2).mean(axis=(1, 2))
-    assert (np.abs(np.log(by_hand / found.error_variance("aof-gaussian").value)) < 1).all()
+    assert (np.abs(np.log(by_hand / smoothed.error_variance("aof-gaussian").value)) < 1).all()

@@ -19,34 +19,36 @@ def holed(steps, runs, seed):
 
 
 def test_the_parts_are_those_of_the_package():
-    y, one = holed(40, 2, 1), aof(STRUCTURE)
-    told = examine(one, y)
-    found = innovations(STRUCTURE.measure, predictions(one, y), y)
+    y, filter_ = holed(40, 2, 1), aof(STRUCTURE)
+    examined = examine(filter_, y)
+    direct = innovations(STRUCTURE.measure, predictions(filter_, y), y)
     for ours, theirs in (
-        (told.estimate.mean, run(one, y).mean),
-        (told.smoothed.cov, smooth(one, y).cov),
-        (told.innovations.value, found.value),
-        (told.innovations.cov, np.broadcast_to(found.cov, told.innovations.cov.shape)),
-        (told.log_likelihood, likelihood(one, y)),
+        (examined.estimate.mean, run(filter_, y).mean),
+        (examined.smoothed.cov, smooth(filter_, y).cov),
+        (examined.innovations.value, direct.value),
+        (examined.innovations.cov, np.broadcast_to(direct.cov, examined.innovations.cov.shape)),
+        (examined.log_likelihood, likelihood(filter_, y)),
     ):
         np.testing.assert_array_equal(ours, theirs)
-    np.testing.assert_array_equal(np.isnan(told.weight), np.isnan(y).all(axis=-1))
-    assert set(told.weight[~np.isnan(told.weight)]) == {1.0}
+    np.testing.assert_array_equal(np.isnan(examined.weight), np.isnan(y).all(axis=-1))
+    assert set(examined.weight[~np.isnan(examined.weight)]) == {1.0}
 
 
 @pytest.mark.parametrize("by_component", [False, True])
 @pytest.mark.parametrize("edge", [1.0, 0.999, 0.99])
 def test_the_intervals_cover(edge, by_component):
     """300 records of 60 steps, a fifth of the cells empty: 95 % with a standard error of 1.3 %."""
-    y, one = holed(60, 300, 7), aof(STRUCTURE)
+    y, filter_ = holed(60, 300, 7), aof(STRUCTURE)
     # with a narrower gate what it refuses, large in truth, makes the prediction after it too sure
     if edge < 1:
-        one = gated(one, edge, patience=None, by_component=by_component)
-    told = examine(one, y)
+        filter_ = gated(filter_, edge, patience=None, by_component=by_component)
+    examined = examine(filter_, y)
     # not those whose track was lost
-    kept = [run for run in range(300) if (told.weight[:, run] > 0).sum() > 30]
+    kept = [run for run in range(300) if (examined.weight[:, run] > 0).sum() > 30]
     assert len(kept) > 295
-    inside = np.mean([[one.fits for one in findings(told, run=run)] for run in kept], axis=0)
+    inside = np.mean(
+        [[filter_.fits for filter_ in findings(examined, run=run)] for run in kept], axis=0
+    )
     assert (np.abs(inside - 0.95) < 4 * np.sqrt(0.95 * 0.05 / len(kept))).all(), inside
 
 
@@ -59,7 +61,11 @@ def test_a_wrong_filter_is_found():
     _, y = simulate(MODEL, 1, 200, seed=5)
 
     def failing(model, seen):
-        return {one.name for one in findings(examine(aof(linearised(model)), seen)) if not one.fits}
+        return {
+            filter_.name
+            for filter_ in findings(examine(aof(linearised(model)), seen))
+            if not filter_.fits
+        }
 
     assert "size" in failing(rough, y)
     assert {"neighbours of y1", "neighbours of y2"} & failing(stiff, y)
@@ -68,5 +74,5 @@ def test_a_wrong_filter_is_found():
 
 def test_nothing_is_found_of_a_record_that_is_refused():
     y = np.full((5, 1, 2), 1e6)
-    told = examine(gated(aof(STRUCTURE), 0.99, patience=None), y)
-    assert (told.weight == 0).all() and findings(told) == []
+    examined = examine(gated(aof(STRUCTURE), 0.99, patience=None), y)
+    assert (examined.weight == 0).all() and findings(examined) == []

@@ -50,19 +50,21 @@ def with_gaps(y):
 def record(changing):
     """Measurements with gaps (9, 5, 2), and what one dense regression finds in them."""
     y = with_gaps(simulate(changing, 5, STEPS, seed=2).y)
-    one = oracles.Changing()
-    found = [
-        oracles.joint_posterior(one.steps(STEPS), one.laws["prior"], y[:, run]) for run in range(5)
+    each = oracles.Changing()
+    smoothed = [
+        oracles.joint_posterior(each.steps(STEPS), each.laws["prior"], y[:, run])
+        for run in range(5)
     ]
     return y, Gaussian(
-        np.stack([one[0] for one in found], axis=1), np.stack([one[1] for one in found], axis=1)
+        np.stack([each[0] for each in smoothed], axis=1),
+        np.stack([each[1] for each in smoothed], axis=1),
     )
 
 
-def same(found, expected):
+def same(smoothed, expected):
     # nine steps of well-conditioned 2 x 2 solutions, and one 18 x 18
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(smoothed.mean, expected.mean, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(smoothed.cov, expected.cov, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("kind", FILTERS)
@@ -83,12 +85,12 @@ def test_on_a_linear_model_it_does_not_matter_where_it_is_linearised(changing, r
 
 @pytest.mark.parametrize("lag", [0, 2, STEPS])
 def test_with_a_lag_it_is_the_smoother_of_what_is_known_then(changing, record, lag):
-    y, one = record[0], aof(linearised(changing))
-    found = smooth(one, y, lag)
+    y, each = record[0], aof(linearised(changing))
+    smoothed = smooth(each, y, lag)
     for k in range(STEPS):
-        shorter = smooth(one, y[: k + 1 + lag])
-        np.testing.assert_allclose(found.mean[k], shorter.mean[k], rtol=1e-10, atol=1e-10)
-        np.testing.assert_allclose(found.cov[k], shorter.cov[k], rtol=1e-10, atol=1e-10)
+        shorter = smooth(each, y[: k + 1 + lag])
+        np.testing.assert_allclose(smoothed.mean[k], shorter.mean[k], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(smoothed.cov[k], shorter.cov[k], rtol=1e-10, atol=1e-10)
 
 
 # ---------------------------------------------------------------- nonlinear
@@ -116,7 +118,7 @@ def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
     y[2, 1] = np.nan
     move, see = compile_noiseless(model)
     prior_root = np.linalg.cholesky(np.linalg.inv(model.prior.cov))
-    found, once = (
+    smoothed, once = (
         smooth_iterated(linearised(model), y, rounds=60),
         smooth(aof(linearised(model)), y),
     )
@@ -143,11 +145,11 @@ def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
         )
         # 3-point differences and the search are right to some 1e-8 of a standard deviation, times
         # the condition
-        np.testing.assert_allclose(found.mean[:, i].ravel(), minimum.x, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(smoothed.mean[:, i].ravel(), minimum.x, rtol=0, atol=1e-6)
         cov = np.linalg.inv(minimum.jac.T @ minimum.jac)
         blocks = np.stack([cov[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in range(5)])
-        np.testing.assert_allclose(found.cov[:, i], blocks, rtol=1e-4, atol=1e-7)
-    assert np.abs(found.mean - once.mean).max() > 0.01  # one round is not the maximum
+        np.testing.assert_allclose(smoothed.cov[:, i], blocks, rtol=1e-4, atol=1e-7)
+    assert np.abs(smoothed.mean - once.mean).max() > 0.01  # one round is not the maximum
 
 
 def test_angles_go_the_short_way_round_in_the_past_too():
@@ -169,10 +171,10 @@ def test_angles_go_the_short_way_round_in_the_past_too():
         lambda model: aof(unscented(model)),
         kalman_filter,
     ):
-        found, other = (smooth(build(model), y) for model, y in (turned(0.0), turned(-2.5)))
-        assert np.abs(found.mean[..., 0]).max() <= np.pi
-        np.testing.assert_allclose(found.cov, other.cov, rtol=1e-9)
-        apart = found.mean - other.mean - [2.5, 0]
+        smoothed, other = (smooth(build(model), y) for model, y in (turned(0.0), turned(-2.5)))
+        assert np.abs(smoothed.mean[..., 0]).max() <= np.pi
+        np.testing.assert_allclose(smoothed.cov, other.cov, rtol=1e-9)
+        apart = smoothed.mean - other.mean - [2.5, 0]
         np.testing.assert_allclose(np.cos(apart[..., 0]), 1, rtol=1e-12)
         np.testing.assert_allclose(apart[..., 1], 0, atol=1e-9)
     model, y = turned(0.0)

@@ -144,15 +144,15 @@ def test_rms_by_part_by_hand():
     # (3 steps, 2 runs, 2)
     error = np.array([[[3.0, 4.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]], [[2.0, 0.0], [0.0, 6.0]]])
     part = np.array([1, 1, 7])
-    found, squares = rms_by_part(error, part), np.array([[12.5, 1], [4, 36]])
-    assert found.value == pytest.approx(np.sqrt(squares.mean(axis=1)))
+    rms, squares = rms_by_part(error, part), np.array([[12.5, 1], [4, 36]])
+    assert rms.value == pytest.approx(np.sqrt(squares.mean(axis=1)))
     # the jackknife of two runs: half the difference of what each gives alone
     alone = np.sqrt(squares)
-    assert found.standard_error == pytest.approx(abs(alone[:, 0] - alone[:, 1]) / 2)
-    assert found.freedom == 1
+    assert rms.standard_error == pytest.approx(abs(alone[:, 0] - alone[:, 1]) / 2)
+    assert rms.freedom == 1
     difference = rms_difference(error, 0 * error, part)
-    np.testing.assert_array_equal(difference.value, found.value)
-    np.testing.assert_array_equal(difference.standard_error, found.standard_error)
+    np.testing.assert_array_equal(difference.value, rms.value)
+    np.testing.assert_array_equal(difference.standard_error, rms.standard_error)
     with pytest.raises(ValueError, match="of the same runs, got 2 and 4"):
         rms_difference(error, np.tile(error, (1, 2, 1)), part)
     for few, labels in ((error[:, :1], part), (error, part[:2])):

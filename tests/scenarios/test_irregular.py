@@ -14,8 +14,8 @@ def test_shares_and_sizes_are_those_asked_for():
     missing = np.isnan(track.y)
     np.testing.assert_array_equal(missing[..., 0], missing[..., 1])
     assert not (track.outlier & missing[..., 0]).any()
-    for found, share in ((missing[..., 0], 0.15), (track.outlier, 0.05 * 0.85)):
-        oracles.is_mean(share, found)
+    for happens, share in ((missing[..., 0], 0.15), (track.outlier, 0.05 * 0.85)):
+        oracles.is_mean(share, happens)
     error = track.y - track.x[..., :2]
     sigma = float(track.model.parameters["sigma"])
     for chosen, deviation in (

@@ -348,22 +348,24 @@ def test_fuse_says_what_is_wrong(changes, message):
 def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_same():
     sensors, times = two_sensors(latency=0.3, jitter=0.2), np.linspace(0.1, 4, 14)
     _, messages = measured(sensors, 3.0, 2, [0.0])
-    told = follow(FREE, sensors, PRIOR, messages, times)
-    np.testing.assert_array_equal(told.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean)
+    followed = follow(FREE, sensors, PRIOR, messages, times)
+    np.testing.assert_array_equal(
+        followed.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean
+    )
     ordered = sorted(messages, key=lambda message: message.tag)
-    assert [(one.sensor, one.time) for one in told.innovations] == [
+    assert [(each.sensor, each.time) for each in followed.innovations] == [
         (m.sensor, pytest.approx(m.tag)) for m in ordered
     ]
     for last in (0, 5, -1):  # each is what the estimate of all that was captured before leaves
-        now, found = ordered[last], told.innovations[last]
+        now, newest = ordered[last], followed.innovations[last]
         earlier = [m._replace(arrival=m.tag) for m in ordered if m.tag < now.tag]
         before = fuse(FREE, sensors, PRIOR, earlier, [now.tag])
         H, R = METERS[now.sensor]
         np.testing.assert_allclose(
-            found.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING
+            newest.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING
         )
-        cov = np.broadcast_to(H @ before.cov[0, :1] @ H.T + R, found.cov.shape)
-        np.testing.assert_allclose(found.cov, cov, rtol=0, atol=ROUNDING)
+        cov = np.broadcast_to(H @ before.cov[0, :1] @ H.T + R, newest.cov.shape)
+        np.testing.assert_allclose(newest.cov, cov, rtol=0, atol=ROUNDING)
 
 
 def test_a_recorded_sensor_needs_no_period():
@@ -372,7 +374,7 @@ def test_a_recorded_sensor_needs_no_period():
         Observation("s", tag, tag, np.array([[value]]))
         for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))
     ]
-    laws = [fuse(FREE, [one], PRIOR, messages, np.array([1.0])) for one in (given, free)]
+    laws = [fuse(FREE, [each], PRIOR, messages, np.array([1.0])) for each in (given, free)]
     np.testing.assert_array_equal(laws[0].mean, laws[1].mean)
     with pytest.raises(ValueError, match="s has no period, as a recorded sensor"):
         free.captures(1.0)

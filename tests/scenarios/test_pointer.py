@@ -21,17 +21,17 @@ pytestmark = pytest.mark.quick
 
 def test_the_matrices_are_those_of_the_paper():
     dt, sd = 0.1, 7.0
-    one = uniform_acceleration(dt, sd, 3.0)
+    model_ = uniform_acceleration(dt, sd, 3.0)
     F = [[1, 0, dt, 0], [0, 1, 0, dt], [0, 0, 1, 0], [0, 0, 0, 1]]
     G = np.diag([dt**2 / 2, dt**2 / 2, dt, dt])  # acts on (ax, ay, ax, ay)
-    np.testing.assert_allclose(one.A, F, rtol=1e-15)
-    np.testing.assert_allclose(one.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
-    np.testing.assert_allclose(one.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
-    np.testing.assert_allclose(one.R, 9 * np.eye(2), rtol=1e-15)
+    np.testing.assert_allclose(model_.A, F, rtol=1e-15)
+    np.testing.assert_allclose(model_.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
+    np.testing.assert_allclose(model_.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
+    np.testing.assert_allclose(model_.R, 9 * np.eye(2), rtol=1e-15)
     # Covariance of what a random acceleration (ax, ay), constant in the interval, does to (x, y,
     # vx, vy).
     effect = G @ np.array([[1, 0], [0, 1], [1, 0], [0, 1]])
-    np.testing.assert_allclose(one.Q, sd**2 * effect @ effect.T, rtol=1e-13)
+    np.testing.assert_allclose(model_.Q, sd**2 * effect @ effect.T, rtol=1e-13)
 
 
 # ---------------------------------------------------------------- start-up

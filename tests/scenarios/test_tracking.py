@@ -28,12 +28,12 @@ def test_positions_step_by_step(control):
     u = np.zeros((6, 2, 3))
     if control:
         u[2:] = (y[2:] - 2 * y[1:-1] + y[:-2]) / T**2
-    found = kalman_positions(y, T, 0.5, 2.0, start, control)
+    estimates = kalman_positions(y, T, 0.5, 2.0, start, control)
     for i in range(2):
         steps = [(A, a, 0.25 * B @ B.T, H, np.zeros(3), 4.0 * np.eye(3)) for a in u[:, i] @ B.T]
         loop = oracles.kalman_loop(steps, (start.mean[i], start.cov), y[:, i])
         expected = [mean[:3] for _, (mean, _) in loop]
-        np.testing.assert_allclose(found[:, i], expected, rtol=1e-10, atol=1e-12)  # rounding
+        np.testing.assert_allclose(estimates[:, i], expected, rtol=1e-10, atol=1e-12)  # rounding
 
 
 def test_a_rough_start_has_the_gain_that_is_asked_for_and_spreads_as_it_says():

@@ -57,13 +57,13 @@ def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
     below 1e3."""
     count = len(EXPRESSIONS) // 2
     together = sp.Matrix(count, 2, EXPRESSIONS)
-    found = compile_function(ARGUMENTS, [together, list(together[:, 0])])(*ensemble)
-    assert found[0].shape == (50, count, 2)
+    computed = compile_function(ARGUMENTS, [together, list(together[:, 0])])(*ensemble)
+    assert computed[0].shape == (50, count, 2)
     for i in range(count):
-        np.testing.assert_allclose(found[1][:, i], found[0][:, i, 0], rtol=0, atol=0)
+        np.testing.assert_allclose(computed[1][:, i], computed[0][:, i, 0], rtol=0, atol=0)
         for j in range(2):
             np.testing.assert_allclose(
-                found[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12
+                computed[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12
             )
 
 
@@ -119,10 +119,10 @@ def test_no_symbol_can_hide_another(name, ensemble):
     # Names in the formula never reach the code as they are.
     odd = sp.Symbol(name, real=True)
     value = odd**2 + sp.sin(odd) + x2
-    found = compile_function([[odd, x2]], [[value]])(ensemble[0])[0]
+    computed = compile_function([[odd, x2]], [[value]])(ensemble[0])[0]
     first, second = ensemble[0].T
     np.testing.assert_allclose(
-        found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14
+        computed[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14
     )
 
 
@@ -131,11 +131,11 @@ def compiled(*expressions):
 
 
 def test_special_functions_are_scipys():
-    found = compiled(sp.erf(symbol("x")), sp.loggamma(symbol("x")))(
+    computed = compiled(sp.erf(symbol("x")), sp.loggamma(symbol("x")))(
         np.array([[0.5, 0.0], [2.0, 0.0]])
     )[0]
     np.testing.assert_allclose(
-        found, [[math.erf(x), math.lgamma(x)] for x in (0.5, 2.0)], rtol=1e-14
+        computed, [[math.erf(x), math.lgamma(x)] for x in (0.5, 2.0)], rtol=1e-14
     )
 
 

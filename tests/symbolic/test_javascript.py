@@ -55,6 +55,6 @@ def test_entries_of_vectors_and_what_is_written_in_place():
         (sp.Piecewise((x, x > 0)), "Piecewise"),
     ],
 )
-def test_what_it_does_not_have_is_refused(formula, said):
-    with pytest.raises(ModelError, match=said):
+def test_what_it_does_not_have_is_refused(formula, reason):
+    with pytest.raises(ModelError, match=reason):
         printed(formula)

@@ -207,8 +207,8 @@ def test_where_nobody_finds_the_place_of_a_jump_there_may_be_one(condition):
     ],
 )
 def test_something_must_be_random(state, meter, laws, problem):
-    found = nothing_random(Model.define(state, meter, {"e": 0} if "e*" in state else {}, **laws))
-    assert problem in found and bool(problem) == bool(found)
+    problems = nothing_random(Model.define(state, meter, {"e": 0} if "e*" in state else {}, **laws))
+    assert problem in problems and bool(problem) == bool(problems)
 
 
 @pytest.mark.parametrize("given", [5, {}, {"state": "x + v"}])

@@ -57,7 +57,7 @@ def test_the_mean_is_what_quadrature_finds(function):
 @pytest.mark.parametrize("right", FUNCTIONS[2:])
 def test_the_covariance_is_what_quadrature_finds(left, right):
     f, g = plain(left), plain(right)
-    mean_f, mean_g = (oracles.gaussian_mean(one, MEAN, COV) for one in (f, g))
+    mean_f, mean_g = (oracles.gaussian_mean(each, MEAN, COV) for each in (f, g))
     expected = oracles.gaussian_mean(
         lambda points: (f(points) - mean_f) * (g(points) - mean_g), MEAN, COV
     )
@@ -107,14 +107,14 @@ def test_variance_of_a_sine_is_finite_for_any_variance():
 
 def test_sums_of_parameters_in_a_denominator_stay_together():
     s, T = sp.symbols("s T", real=True)
-    found = GaussianMoments([x], [m], sp.Matrix([[d]])).mean_of(
+    moment = GaussianMoments([x], [m], sp.Matrix([[d]])).mean_of(
         T * sp.sin(x) / (1 + s**2) + sp.exp(x / (1 + s)) / (1 + T)
     )
     by_hand = T * sp.exp(-d / 2) * sp.sin(m) / (1 + s**2) + sp.exp(
         m / (1 + s) + d / (1 + s) ** 2 / 2
     ) / (1 + T)
     at = {s: sp.Rational(3, 10), T: 2, m: sp.Rational(1, 2), d: sp.Rational(1, 4)}
-    assert abs(sp.N((found - by_hand).subs(at), 30)) < 1e-25
+    assert abs(sp.N((moment - by_hand).subs(at), 30)) < 1e-25
 
 
 def test_what_is_no_law_or_another_s_symbol_is_refused():

@@ -44,15 +44,15 @@ def test_a_known_state_has_no_part_in_the_unexplained(kind):
         prior={"mean": [0.3, 0.3], "variance": [1.0, 0.0]},
         meter_noise={"variance": 1.5},
     )
-    one, structure = aof(kind(model)), kind(model)
-    state = one.init(3)
+    filter_, structure = aof(kind(model)), kind(model)
+    state = filter_.init(3)
     for y in simulate(model, 3, 30, seed=2).y:
         G, F, R = structure.measure(*state.predicted)[1:]
         explained = G @ state.predicted.cov @ np.swapaxes(G, -1, -2)
         np.testing.assert_allclose(F - explained, R, rtol=1e-12)
         assert (R >= 1.5).all()
         assert not G[..., 1].any()
-        state = one.step(state, y)
+        state = filter_.step(state, y)
 
 
 @pytest.mark.parametrize("kind", [linearised, gaussian, unscented, gauss_hermite])
@@ -67,14 +67,14 @@ def test_two_collinear_exact_meters_of_a_constant_state(kind, slopes):
         prior={"mean": [0, 0], "variance": [1e8, 1e8]},
     )
     x, y = simulate(model, 200, 20, seed=2)
-    found = run(aof(kind(model)), y)
+    estimates = run(aof(kind(model)), y)
     left = 1e8 * (np.eye(2) - np.outer(slopes, slopes) / np.dot(slopes, slopes))
     np.testing.assert_allclose(
-        np.broadcast_to(found.cov, (20, 200, 2, 2)),
+        np.broadcast_to(estimates.cov, (20, 200, 2, 2)),
         np.broadcast_to(left, (20, 200, 2, 2)),
         atol=1.0,
     )
-    nees = ((x - found.mean) ** 2)[-1].mean(axis=0) / np.diagonal(left)
+    nees = ((x - estimates.mean) ** 2)[-1].mean(axis=0) / np.diagonal(left)
     # of 200 squares of standard normal numbers
     assert (np.abs(nees - 1) < 4 * np.sqrt(2 / 200)).all()
 
@@ -166,9 +166,9 @@ def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
     of -1e29."""
     model = Model.define("0.9*x + v", "2*x + 1", prior={"mean": 0.3, "variance": 2.0})
     y = np.array([1.7, 0.2, -3.0])
-    found, exact = (run(aof(one(model)), y) for one in (build, gaussian))
-    np.testing.assert_array_equal(found.cov, np.zeros((3, 1, 1, 1)))
-    np.testing.assert_allclose(found.mean, exact.mean, rtol=1e-12)
+    estimates, exact = (run(aof(filter_(model)), y) for filter_ in (build, gaussian))
+    np.testing.assert_array_equal(estimates.cov, np.zeros((3, 1, 1, 1)))
+    np.testing.assert_allclose(estimates.mean, exact.mean, rtol=1e-12)
     still = Model.define("x", "x", prior={"mean": 0, "variance": 2.0})
     np.testing.assert_array_equal(run(aof(build(still)), np.ones(3)).cov, np.zeros((3, 1, 1, 1)))
     with pytest.raises(ValueError, match="no density for the measurement of step 1"):

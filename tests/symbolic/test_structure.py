@@ -130,8 +130,8 @@ def test_gaussian_functions_are_what_quadrature_finds(name):
     """Ten points an axis integrate exponentials and sines of these variances to 1e-9; Stein:
     dtau/dz = Cov(a, x) P^-1, dh/dm = Cov(b, x) P^-1."""
     model = MODELS[name]()
-    found = parts(gaussian(model), *model.prior)
-    for (equation, _, noise), ours in zip(sides(model), found, strict=True):
+    computed = parts(gaussian(model), *model.prior)
+    for (equation, _, noise), ours in zip(sides(model), computed, strict=True):
         for part, expected in zip(ours, quadrature(model, equation, noise), strict=False):
             np.testing.assert_allclose(part, expected, rtol=1e-8, atol=1e-9)
 
@@ -151,8 +151,8 @@ def test_linearised_functions_are_values_and_difference_quotients(name):
             axis=-1,
         )
 
-    found = parts(linearised(model), x, P)
-    for (_, function, (m, D)), ours in zip(sides(model), found, strict=True):
+    computed = parts(linearised(model), x, P)
+    for (_, function, (m, D)), ours in zip(sides(model), computed, strict=True):
         value, spread, slope, unexplained = ours
         A = slopes(lambda at, of=function, m=m: of(at, m), x)
         B = slopes(lambda at, of=function: of(x, at), m)
@@ -170,10 +170,10 @@ def test_gauss_hermite_is_exact_for_polynomials(name):
         np.stack([model.prior.cov, 2 * model.prior.cov]),
     )
     # degree 3 at most, so squares of degree 6 < 2 * 4; rounding of some hundred summands
-    for found, expected in zip(
+    for computed, expected in zip(
         parts(gauss_hermite(model, 4), *law), parts(gaussian(model), *law), strict=True
     ):
-        for ours, exact in zip(found, expected, strict=True):
+        for ours, exact in zip(computed, expected, strict=True):
             np.testing.assert_allclose(*np.broadcast_arrays(ours, exact), rtol=1e-11, atol=1e-11)
 
 
@@ -181,11 +181,11 @@ def test_gauss_hermite_is_exact_for_polynomials(name):
 def test_unscented_means_are_exact_for_quadratic_functions(kappa):
     model = vector_model()
     numerical, exact = unscented(model, kappa), gaussian(model)
-    for found, expected in zip(
+    for computed, expected in zip(
         parts(numerical, *model.prior), parts(exact, *model.prior), strict=True
     ):
-        np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
-        np.testing.assert_allclose(found[2], expected[2], rtol=1e-12)
+        np.testing.assert_allclose(computed[0], expected[0], rtol=1e-12)
+        np.testing.assert_allclose(computed[2], expected[2], rtol=1e-12)
 
 
 def test_large_means_lose_no_digits():
@@ -204,8 +204,8 @@ def test_large_means_lose_no_digits():
         ("exp(x/10**6)", sp.exp(2 * q * m + q**2 * d) * (sp.exp(q**2 * d) - 1), 1e-12),
     ):
         structure = gaussian(Model.define("x + v", meter))
-        found = structure.measure(np.array([[1e6]]), np.array([[[1e-10]]])).F.item()
-        assert found == pytest.approx(float(F.evalf(60)), rel=accuracy)
+        computed = structure.measure(np.array([[1e6]]), np.array([[[1e-10]]])).F.item()
+        assert computed == pytest.approx(float(F.evalf(60)), rel=accuracy)
 
 
 def test_numerical_structures_have_no_formulas(variant53):
@@ -269,12 +269,12 @@ def test_models_that_differ_in_a_number_only_are_not_taken_for_each_other(derive
         state_noise={"variance": 4},
         meter_noise={"variance": 4},
     )
-    found = []
+    computed = []
     for model in (variant53, variant53.replace(e=0.1, f=0.04), noisier, variant53):
         structure = derive(model)
         assert structure.model is model
-        found.append((structure.predict(z, p).cov, structure.measure(z, p).R))
-    first, doubled, other, again = found
+        computed.append((structure.predict(z, p).cov, structure.measure(z, p).R))
+    first, doubled, other, again = computed
     # e v with twice the e, or four times the variance
     np.testing.assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)
     assert np.array_equal(first, again) and not np.allclose(first, doubled)

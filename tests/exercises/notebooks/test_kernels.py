@@ -56,7 +56,7 @@ def test_it_is_a_kernel_of_its_own_notebook(tmp_path, monkeypatch):
         folder = tmp_path / value
         folder.mkdir()
         *texts, figure = run(*cells, folder=folder)
-        assert [one.text for one in texts] == ["True\n", "[] False\n", f"{value} {folder}\n"]
+        assert [each.text for each in texts] == ["True\n", "[] False\n", f"{value} {folder}\n"]
         assert "image/png" in figure.data
 
 
