@@ -38,7 +38,7 @@ def test_entries_of_vectors_and_what_is_written_in_place():
 
 
 @pytest.mark.parametrize(
-    ("formula", "said"),
+    ("formula", "reason"),
     [
         (
             sp.erf(x),
