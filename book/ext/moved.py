@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from equations import FOLDERS
+
 TAKEN_IN = {
     "better-than-a-tangent": "beyond/when-linearisation-fails",
     "checking-exact": "course/comparison",
@@ -18,7 +20,6 @@ TAKEN_IN = {
     "particles": "beyond/grid",
     "radar-extended": "course/radar-tracking",
 }
-FOLDERS = "course", "beyond", "reference"
 
 
 def pages(app) -> Iterator[tuple[str, dict[str, str], str]]:

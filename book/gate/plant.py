@@ -25,14 +25,13 @@ from typing import Any, NamedTuple
 
 import jupytext
 import numpy as np
-from equations import BEYOND, COURSE
+from equations import BEYOND, COURSE, FOLDERS
 
 from gate.page import Formula, Letters, formulas, letters_of, outside_points
 from gate.tex import is_relation, normal, pieces
 from kfcourse.pages import Unverified
 
 BOOK = Path(__file__).resolve().parents[1]
-FOLDERS = "", "course", "beyond", "reference"
 MADE = {BOOK / f"{name}.md" for name in (COURSE, BEYOND)}  # by the build
 MOST = 0.05
 KINDS = ("sign", "factor", "index", "transposition")
@@ -40,7 +39,7 @@ KINDS = ("sign", "factor", "index", "transposition")
 
 def written() -> list[Path]:
     """The pages of the book that somebody has written."""
-    return sorted({page for name in FOLDERS for page in (BOOK / name).glob("*.md")} - MADE)
+    return sorted({page for name in ("", *FOLDERS) for page in (BOOK / name).glob("*.md")} - MADE)
 
 
 class Planted(NamedTuple):

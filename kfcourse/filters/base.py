@@ -131,6 +131,12 @@ class Filter:
             object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
 
 
+def drawn_from_memory(state: State, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    """`Filter.drawn` of a filter whose memory holds the posterior."""
+    states, modes = state.memory.drawn(number, rng)
+    return states, modes
+
+
 def structure_of(filter_: Filter, what: str) -> Structure:
     """The structural functions of a filter; ValueError that tells what needs them if it has
     none."""

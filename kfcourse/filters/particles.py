@@ -44,7 +44,7 @@ from scipy.special import gammaln
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Filter, State, drawn_from_memory, initial_state
 from kfcourse.filters.densities import likelihood, transition
 from kfcourse.laws import (
     Array,
@@ -172,7 +172,7 @@ def particle(
     back = sampler.look_back if jumping is None else None
     return Filter(
         name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, look_back=back,
-        drawn=lambda state, *how: state.memory.drawn(*how),
+        drawn=drawn_from_memory,
     )  # fmt: skip
 
 

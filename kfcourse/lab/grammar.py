@@ -124,7 +124,7 @@ def generate(
     tables = (propose(seed, index) for index in range(PATIENCE * wanted))
     bar = tqdm(desc="generating", total=wanted, unit="variant", disable=None)
     with joblib.Parallel(n_jobs=jobs) as parallel, bar:
-        while len(variants) < wanted and (chunk := list(islice(tables, jobs))):
+        while len(variants) < wanted and (chunk := list(islice(tables, 4 * jobs))):
             judged = parallel(joblib.delayed(_judge)(table, runs, seed, ask) for table in chunk)
             for table, quality in zip(chunk, judged, strict=True):
                 shape = json.dumps([table["state"], table["meter"]])

@@ -228,13 +228,12 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
             f"Innovations of {name} between bounds of two standard deviations; 95 of 100 lie "
             "within if the filter is right."
         )
-        of = (columns, name, passed)
-        pictures[f"innovations-{name}"] = about, partial(_innovations, times, *of)
+        pictures[f"innovations-{name}"] = about, partial(_innovations, times, columns, name, passed)
         about = (
             f"Correlation of the innovations of {name} with later ones; between the bounds in 95 "
             "of 100 lags if they are white."
         )
-        pictures[f"whiteness-{name}"] = about, partial(_whiteness, *of)
+        pictures[f"whiteness-{name}"] = about, partial(_whiteness, columns, name, passed)
     content = {
         "result": result,
         "model": lines_of(model.latex()),

@@ -124,14 +124,15 @@ def foretold(ensemble: Ensemble, k: int, drawn: tuple[Array, Array] | None) -> A
     """y_k (runs, p) of an ensemble whose states x_{k-1} (runs, n) and modes (runs,), if it has any,
     are these; of the first step by the prior."""
     model = ensemble.model
-    advance = _jumping(model) if isinstance(model, JumpModel) else _moving(model)
     before, now = zip(*_noises(ensemble, 1, 2), strict=True)
-    state: Sequence[Array | None] = _initial(ensemble)
-    if drawn is not None:
-        size = len(state)  # two with modes
-        moved = advance(k - 1, *drawn[:size], *before)
-        state = (moved.x_next, moved.mode_next)[:size]
-    return advance(k, *state, *now).y
+    if isinstance(model, JumpModel):
+        advance, kinds = _jumping(model), 2
+    else:
+        advance, kinds = _moving(model), 1
+    if drawn is None:
+        return advance(0, *_initial(ensemble), *now).y
+    moved = advance(k - 1, *drawn[:kinds], *before)
+    return advance(k, *(moved.x_next, moved.mode_next)[:kinds], *now).y
 
 
 def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:

@@ -119,6 +119,8 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
         "one became infinite or NaN" in str(result.left_out["one"])
         and result.left_out["one"].kind == "infinite"
     )
+    with pytest.raises(KeyError, match="no results for 'one': step 2: one became infinite"):
+        result.error_variance("one")
     np.testing.assert_array_equal(
         result.error_variance("duof").value,
         compare(good, *size, **options).error_variance("duof").value,

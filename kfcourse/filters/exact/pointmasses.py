@@ -12,7 +12,7 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Filter, State, drawn_from_memory, initial_state
 from kfcourse.filters.exact.columns import (
     ERROR,
     EVIDENCE,
@@ -170,7 +170,7 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         exact.step,
         evidence=_evidence,
         look_back=back,
-        drawn=lambda state, *how: state.memory.drawn(*how),
+        drawn=drawn_from_memory,
     )
 
 
@@ -282,10 +282,15 @@ class Exact:
         panels = np.concatenate([panels for panels, _ in parts])
         begin = np.cumsum(np.concatenate([[0], *(np.diff(begin) for _, begin in parts)]))
         if self.model.angles.x:
-            x, mass = _points(panels)
-            for run, rows in enumerate(map(slice, begin, begin[1:])):
-                moments = moments_on_circle(x[rows].ravel(), mass[rows].ravel())
-                numbers[run, 0, [MEAN, VARIANCE]] = moments
+            # a row for each trajectory, filled up by panels without mass
+            place = np.arange(np.diff(begin).max())
+            inside = place < np.diff(begin)[:, None]
+            x, mass = (
+                part[np.where(inside, begin[:-1, None] + place, 0)] for part in _points(panels)
+            )
+            rows = len(values), -1
+            moments = moments_on_circle(x.reshape(rows), (mass * inside[..., None]).reshape(rows))
+            numbers[:, 0, MEAN], numbers[:, 0, VARIANCE] = moments
         law = _law(numbers, MEAN, numbers[:, :, PROBABILITY])
         evidence = np.where(np.isnan(y), 0.0, np.logaddexp.reduce(numbers[:, :, EVIDENCE], axis=1))
         memory = PointMass(panels, begin, numbers, evidence, _error(numbers, law), law.cov[:, 0, 0])
