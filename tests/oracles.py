@@ -4,6 +4,7 @@ computations."""
 from typing import ClassVar
 
 import numpy as np
+import sympy as sp
 
 from kfcourse import Model
 
@@ -53,6 +54,17 @@ def mixture(weights, laws):
     mean = sum(w * m for w, (m, _) in zip(weights, laws, strict=True))
     spread = (P + np.outer(m - mean, m - mean) for m, P in laws)
     return mean, sum(w * P for w, P in zip(weights, spread, strict=True))
+
+
+def executed(formula, symbols, values):
+    """A printed formula at values of its symbols, arrays (N, rows, columns) of matrices and (N,) of
+    numbers: by SymPy's own code for each of N."""
+    names = [
+        sp.MatrixSymbol(f"M{i}", *each.shape[1:]) if each.ndim > 1 else sp.Symbol(f"a{i}")
+        for i, each in enumerate(values)
+    ]
+    function = sp.lambdify(names, formula.xreplace(dict(zip(symbols, names, strict=True))), "numpy")
+    return np.array([function(*row) for row in zip(*values, strict=True)])
 
 
 def steps_of(system, count):

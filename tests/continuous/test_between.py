@@ -25,7 +25,7 @@ from kfcourse import (
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
 from kfcourse.filters import aof, duof, fos, kalman_filter
-from kfcourse.lab.variants import VariantError, read_variant, summary
+from kfcourse.lab.variants import VariantError, find_variant, read_variant, summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.records import estimate, read_measurements
@@ -191,8 +191,9 @@ def test_the_moment_equations_against_a_slow_loop(structure, exact):
         assert np.abs(more - less).max() > 1e-6
 
 
-def test_the_derived_equations_are_the_page_s():
-    model = van_der_pol()
+@pytest.mark.parametrize("name", ["", "CD2", "C2"])
+def test_the_derived_equations_are_the_page_s(name):
+    model = find_variant(name).model if name else van_der_pol()
     for structure, exact in ((linearised, False), (gaussian, True)):
         equations = moment_equations(model, structure)
         values = np.array([1.5, -0.8, 0.3, 0.1, 0.5])
@@ -509,26 +510,15 @@ def test_many_trajectories_that_turn_fast_are_no_stiff_ones():
     assert_allclose(tau, z @ turn.T, rtol=0, atol=4e-3)
 
 
-TABLE = {
-    "title": "cubic drift, quadratic meter",
-    "drift": "a1*x + a3*x**3",
-    "meter": "x + 0.5*x**2 + w",
-    "parameters": {"a1": -0.5, "a3": -0.01},
-    "steps": 11,
-}
-
-
-def test_a_table_has_drift_and_diffusion():
-    """The school's CD1 with a drift that comes back."""
-    variant = read_variant("CD1", TABLE | {"diffusion": "1.5"}, "here")
-    assert variant.steps == 11 and variant.model.between.diffusion[0] == sp.Rational(3, 2)
-    z, p = 0.7, 0.4
+@pytest.mark.parametrize("name", ["CD1", "C1"])
+def test_a_table_has_drift_and_diffusion(name):
+    variant, z, p = find_variant(name), 0.7, 0.4
     equations = moment_equations(variant.model)
     at = {equations.z[0]: z, equations.p[0]: p} | variant.model.values
     # the page's: a1 z + a3 (z^3 + 3 z p), a1 + 3 a3 (z^2 + p), 2.25
     wanted = [-0.5 * z - 0.01 * (z**3 + 3 * z * p), -0.5 - 0.03 * (z**2 + p), 2.25]
     assert [float(part[0].subs(at)) for part in equations[2:]] == pytest.approx(wanted, abs=1e-12)
-    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", variant.table)
+    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary(name, variant.table)
 
 
 @pytest.mark.parametrize(
@@ -540,4 +530,4 @@ def test_a_table_has_drift_and_diffusion():
 )
 def test_tables_that_are_no_variant_are_refused(change, words):
     with pytest.raises(VariantError, match=words):
-        read_variant("CD1", TABLE | change, "here")
+        read_variant("own", {"drift": "-x", "meter": "x + w"} | change, "here")

@@ -209,7 +209,8 @@ def exact_ensemble(system: Linear | oracles.Changing, steps: int, seed: int) -> 
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
-    """Every filter equals the Kalman filter when the model is linear and Gaussian.
+    """Every filter equals the Kalman filter when the model is linear and Gaussian; and that is the
+    loop of the textbook, with the matrices of each step.
 
     AOF: the structural functions of a linear model are exact whatever the approximation, and the
     posterior is Gaussian, so its mean and covariance are the exact ones.  DUOF, FOS, MFOS: their
@@ -236,6 +237,11 @@ def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
     y = simulate(model, 5, STEPS, seed=8).y  # new trajectories, not those of the design
     y[0, 2] = y[2, 1] = np.nan
     expected, ahead = run(kalman_filter(model), y), predictions(kalman_filter(model), y)
+    steps, prior = oracles.steps_of(LINEAR[name], STEPS), LINEAR[name].laws["prior"]
+    for i in range(5):
+        _, right = zip(*oracles.kalman_loop(steps, prior, y[:, i]), strict=True)
+        for ours, wanted in zip(expected, zip(*right, strict=True), strict=True):
+            assert_allclose(ours[:, i], wanted, rtol=1e-9, atol=1e-9)
 
     def agree(actual, wanted, tolerance):
         assert_allclose(actual, wanted, rtol=tolerance, atol=tolerance, err_msg=filter_.name)

@@ -1,5 +1,5 @@
-"""Models with time and known inputs: against loops typed by hand, and the Kalman filter with
-matrices that change."""
+"""Models with time and known inputs: against loops typed by hand; the Kalman filter with
+matrices that change: test_every_filter."""
 
 import math
 
@@ -39,24 +39,13 @@ U = list(oracles.Changing.U)
 # change
 
 
-@pytest.mark.parametrize("name", ["changing", "scalar, more noises", "n=3, p=2", "n=1, p=2"])
-def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each_step(name):
-    system = LINEAR[name]
-    y = simulate(system.model(), 4, STEPS, seed=3).y
-    law = run(kalman_filter(system.model()), y)
-    for i in range(4):
-        loop = oracles.kalman_loop(oracles.steps_of(system, STEPS), system.laws["prior"], y[:, i])
-        for k, (_, expected) in enumerate(loop):
-            for ours, wanted in zip(law, expected, strict=True):
-                assert_allclose(ours[k, i], wanted, rtol=1e-9, atol=1e-9)
-
-
 def test_trajectories_satisfy_the_equations_of_each_step():
-    """What is left of them are the noises, in their places and sizes, independent of one another,
+    """They begin as the prior says; what is left of them are the noises, in their places and sizes, independent of one another,
     of the states and of those before: four standard errors."""
     system, runs = LINEAR["changing"], 4000
     x, y = simulate(system.model(), runs, STEPS, seed=1)
     _, (m_v, D_v), (m_w, D_w) = system.laws.values()
+    oracles.has_moments(x[0], *system.laws["prior"])
     before = np.empty((0, runs))
     for k in range(STEPS - 1):
         A, B, a, H, C, b = system.at(k)

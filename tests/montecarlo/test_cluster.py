@@ -19,6 +19,7 @@ def address():
         yield workers.scheduler_address
 
 
+@pytest.mark.slow
 def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, variant53, tmp_path):
     """The first worker to take a piece ends; what it had begun is done by another, with the same
     result.

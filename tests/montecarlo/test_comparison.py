@@ -336,7 +336,7 @@ def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
 def test_the_particles_own_error_is_not_in_the_bound(linear):
     """The Kalman filter is exact: what distances tell is the particles' error, of which a product
     of both halves holds little."""
-    exact = replace(particle(linear, 100), name="aof-exact")
+    exact = replace(particle(linear, 50), name="aof-exact")
     result = compare([kalman_filter(linear), exact], linear, 12_800, 1, seed=1, progress=False)
     excess = result.difference("kalman", "aof-exact")
     doubt = result.sums.means("doubt")[:, 0]

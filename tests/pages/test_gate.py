@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from gate import plant as gate
 from matplotlib import pyplot as plt
+from weekly import weekly
 
 from kfcourse.pages import Unverified
 
@@ -78,11 +79,9 @@ LONG |= {"course/time-tags", "course/consistency"}
 
 
 @pytest.mark.parametrize(
-    "chapter",
-    [pytest.param(name, marks=pytest.mark.slow if name in LONG else []) for name in CHANGES],
+    ("chapter", "right", "wrong"), weekly([(k, *v) for k, v in CHANGES.items()], dear=LONG)
 )
-def test_a_changed_sign_stops_the_chapter(chapter: str, monkeypatch: pytest.MonkeyPatch):
-    right, wrong = CHANGES[chapter]
+def test_a_changed_sign_stops_the_chapter(chapter, right, wrong, monkeypatch):
     text = (BOOK / f"{chapter}.md").read_text(encoding="utf-8")
     assert text.count(right) == 1, (
         "the line to be changed has gone, or is there twice: choose another"

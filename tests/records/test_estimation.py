@@ -49,7 +49,7 @@ def test_a_direction_that_is_not_told_is_named_whole(start):
     model = Model.define(
         "0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0}
     )
-    y = simulate(model, 1, 60, seed=1).y
+    y = simulate(model, 1, 30, seed=1).y
     estimated = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
     assert (
         len(estimated.flat) == 1

@@ -1,4 +1,4 @@
-"""Smoothers: one dense regression on linear models, the likeliest trajectory, brute force, and
+"""Smoothers and likelihoods: one dense regression on linear models, the likeliest trajectory, brute force, and
 published figures."""
 
 import numpy as np
@@ -6,7 +6,16 @@ import oracles
 import pytest
 from scipy.optimize import least_squares
 
-from kfcourse import Model, gauss_hermite, gaussian, linearised, simulate, smooth, unscented
+from kfcourse import (
+    Model,
+    gauss_hermite,
+    gaussian,
+    likelihood,
+    linearised,
+    simulate,
+    smooth,
+    unscented,
+)
 from kfcourse.filters import aof, duof, imm, iterated, kalman_filter, particle, pointmass
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.designing import design
@@ -48,16 +57,21 @@ def with_gaps(y):
 
 @pytest.fixture(scope="module")
 def record(changing):
-    """Measurements with gaps (9, 5, 2), and what one dense regression finds in them."""
+    """Measurements with gaps (9, 5, 2), and what one dense regression finds in them: the law of the
+    states, and the log density of each run."""
     y = with_gaps(simulate(changing, 5, STEPS, seed=2).y)
     each = oracles.Changing()
     smoothed = [
         oracles.joint_posterior(each.steps(STEPS), each.laws["prior"], y[:, run])
         for run in range(5)
     ]
-    return y, Gaussian(
-        np.stack([each[0] for each in smoothed], axis=1),
-        np.stack([each[1] for each in smoothed], axis=1),
+    return (
+        y,
+        Gaussian(
+            np.stack([each[0] for each in smoothed], axis=1),
+            np.stack([each[1] for each in smoothed], axis=1),
+        ),
+        [each[2] for each in smoothed],
     )
 
 
@@ -68,18 +82,23 @@ def same(smoothed, expected):
 
 
 @pytest.mark.parametrize("kind", FILTERS)
-def test_on_a_linear_model_every_smoother_is_the_regression_on_the_whole_record(
+def test_on_a_linear_model_smoothers_and_likelihoods_are_the_regression_on_the_whole_record(
     changing, record, kind
 ):
     """The structural functions of a linear model are exact whatever the approximation, and all laws
     are normal."""
-    y, expected = record
-    same(smooth(FILTERS[kind](changing), y), expected)
+    y, expected, density = record
+    filter_ = FILTERS[kind](changing)
+    same(smooth(filter_, y), expected)
+    logs = likelihood(filter_, y)
+    assert not logs[np.isnan(y).all(axis=-1)].any()
+    # an 18 x 18 determinant against nine of 2 x 2
+    np.testing.assert_allclose(logs.sum(axis=0), density, rtol=1e-11)
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_on_a_linear_model_it_does_not_matter_where_it_is_linearised(changing, record, kind):
-    y, expected = record
+    y, expected, _ = record
     same(smooth_iterated(STRUCTURES[kind](changing), y, rounds=3), expected)
 
 
@@ -190,6 +209,11 @@ def test_angles_go_the_short_way_round_in_the_past_too():
 
 
 SCALAR = Model.define("0.9*x + v", "x + w")
+KNOWN = Model.define(["x1"], ["x1", "x1"], prior={"mean": [1.0]}, symbols={"x": ["x1"]})
+
+
+def designed():
+    return design([duof(SCALAR)], Ensemble(SCALAR, 100, 3, seed=1))[0]
 
 
 @pytest.mark.parametrize(
@@ -225,13 +249,19 @@ SCALAR = Model.define("0.9*x + v", "x + w")
             "looking back needs the structural functions.*imm has none.*take one",
         ),
         (
-            lambda: smooth(
-                design([duof(SCALAR)], Ensemble(SCALAR, 100, 3, seed=1))[0], np.zeros(3)
-            ),
+            lambda: smooth(designed(), np.zeros(3)),
             "looking back needs the structural functions.*duof has none.*take one",
+        ),
+        (
+            lambda: likelihood(designed(), np.zeros(3)),
+            "the likelihood needs the structural functions.*duof has none",
+        ),
+        (
+            lambda: likelihood(kalman_filter(KNOWN), np.ones((2, 1, 2))),
+            "no density for the measurement of step 0, run 0: .* give every component of the meter",
         ),
     ],
 )
-def test_what_cannot_be_smoothed_is_refused(call, problem):
+def test_what_cannot_be_smoothed_or_has_no_density_is_refused(call, problem):
     with pytest.raises(ValueError, match=problem):
         call()

@@ -20,7 +20,6 @@ from kfcourse.scenarios.benchmarks import (
     logistic,
     lorenz,
     lorenz_data,
-    pendulum_data,
     reentry,
 )
 from kfcourse.symbolic.equations import compile_noiseless
@@ -60,14 +59,19 @@ def test_the_extended_filter_has_the_published_errors():
 
 
 def test_the_reentry_of_the_source():
-    """Newton's law and the drag, in plain numbers; and the extended filter's published error,
-    km."""
-    x, y = simulate(reentry(known=True), 20, 2001, seed=1)
+    """Newton's law and the drag, in plain numbers."""
+    x, _ = simulate(reentry(known=True), 20, 2, seed=1)
     r, speed = np.hypot(x[0, 0, 0], x[0, 0, 1]), np.hypot(x[0, 0, 2], x[0, 0, 3])
     drag = -0.59783 * np.exp(0.6932) * np.exp((6374 - r) / 13.406) * speed
     following = x[0, 0, 2:4] + 0.1 * (drag * x[0, 0, 2:4] - 3.986e5 / r**3 * x[0, 0, :2])
     assert (np.abs(x[1, 0, 2:4] - following) < 5 * np.sqrt(2.4064e-5)).all()
     assert (x[:, :, 4] == 0.6932).all() and np.ptp(x[-1, :, 0]) > 0
+
+
+@pytest.mark.slow
+def test_the_reentry_s_extended_filter_has_the_published_error():
+    """Of positions, in km; the chapter on the literature has more filters."""
+    x, y = simulate(reentry(known=True), 20, 2001, seed=1)
     y[0] = np.nan  # the source predicts before its first correction
     error = (run(aof(linearised(reentry(known=False))), y).mean - x)[1:, :, :2]
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
@@ -90,17 +94,6 @@ def test_the_car_of_the_source():
     np.testing.assert_allclose(run(kalman_filter(car()), y).mean[:, 0], means, rtol=0, atol=1e-10)
     for name, place in (("measurements", y[1:, 0]), ("Kalman", np.array(means)[1:, :2])):
         assert abs(np.sqrt(((place - x[:, :2]) ** 2).sum(axis=1).mean()) - CAR_ERRORS[name]) < 1e-12
-
-
-@pytest.mark.quick
-def test_the_pendulum_s_data_are_the_file_s():
-    x, y = pendulum_data()
-    assert (
-        x.shape == (500, 2)
-        and y.shape == (501, 1, 1)
-        and np.isnan(y[0, 0, 0])
-        and np.isfinite(y[1:]).all()
-    )
 
 
 def test_the_conditionally_minimax_models_are_those_of_the_source():

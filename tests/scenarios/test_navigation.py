@@ -77,16 +77,6 @@ def measured(
 # ---------------------------------------------------------------- transitions
 
 
-def test_transition_of_a_double_integrator():
-    q, dt = 0.7, 1.7
-    step = Dynamics([[0, 1], [0, 0]], np.diag([0, q]), [[0], [1]]).over(dt)
-    np.testing.assert_allclose(step.A, [[1, dt], [0, 1]], rtol=1e-14)
-    np.testing.assert_allclose(step.B, [[dt**2 / 2], [dt]], rtol=1e-14)
-    np.testing.assert_allclose(
-        step.Q, q * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), rtol=1e-14
-    )
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -158,12 +158,6 @@ def test_a_vector_model_prints_every_component():
     assert model.latex().splitlines()[1:-1] == [*equations[:3], equations[3] + r" \\", "a &= 0.5"]
 
 
-def test_the_latex_of_a_scalar_model_has_no_indices(variant53):
-    lines = variant53.latex().splitlines()
-    assert lines[1:3] == [r"{x}_{k+1} &= c x + e x v \\", r"{y}_{k} &= g x + f x^{2} w \\"]
-    assert lines[-2] == "f &= 0.02"
-
-
 def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
     """Each number is within its limits, their product in the moments is not: generated code would
     hold the name `inf`."""

@@ -6,7 +6,7 @@ import pytest
 import scipy
 import sympy as sp
 
-from kfcourse.symbolic.equations import compile_model, compile_noiseless
+from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -246,15 +246,6 @@ def test_an_exponential_of_a_large_constant_is_not_torn_apart():
 def test_what_is_no_rule_of_points_is_refused(variant53, build, problem):
     with pytest.raises(ModelError, match=problem):
         build(variant53)
-
-
-def test_the_noiseless_model_has_its_noises_at_their_means():
-    model = vector_model()
-    state, meter = compile_model(model)
-    a, b = compile_noiseless(model)
-    x = np.random.default_rng(3).normal(size=(6, 2))
-    np.testing.assert_allclose(a(x), state(x, np.tile(model.state_noise.mean, (6, 1))), rtol=1e-13)
-    np.testing.assert_allclose(b(x), meter(x, np.tile(model.meter_noise.mean, (6, 1))), rtol=1e-13)
 
 
 @pytest.mark.parametrize("derive", [linearised, gaussian])

@@ -2,6 +2,7 @@
 their names."""
 
 import pytest
+from weekly import weekly
 
 from kfcourse.exercises.checks import Derivation, exercise, sets
 from kfcourse.exercises.checks.editing import rebound, uses
@@ -9,14 +10,7 @@ from kfcourse.exercises.checks.question import ForVariant
 
 DEAR = {"f4-f2", "f4-f3"}  # the exact filter again for each mistake
 FOLLOWING = [
-    pytest.param(
-        letter,
-        question,
-        step,
-        earlier,
-        id=(name := f"{question.name}-{earlier.name}"),
-        marks=[pytest.mark.slow] if name in DEAR else [],
-    )
+    (f"{question.name}-{earlier.name}", letter, question, step, earlier)
     for letter, set_ in sets().items()
     for question in set_.questions
     if (step := question.key.step if isinstance(question.key, ForVariant) else question.key)
@@ -28,30 +22,14 @@ FOLLOWING = [
 
 
 def test_these_steps_stand_on_earlier_ones():
-    names = {row.values[1].name for row in FOLLOWING}
-    assert {
-        "a6",
-        "b2",
-        "b3",
-        "b4",
-        "b5",
-        "c3",
-        "c4",
-        "d2",
-        "d3",
-        "f4",
-        "g5",
-        "i2",
-        "k4",
-        "l5",
-        "m5",
-        "o3",
-        "o6",
-    } <= names
+    last = "a6 b2 b3 b4 b5 c3 c4 d2 d3 f4 g5 i2 k4 l5 m5 o3 o6"
+    assert {*last.split()} <= {question.name for _, _, question, *_ in FOLLOWING}
 
 
-@pytest.mark.parametrize(("letter", "question", "step", "earlier"), FOLLOWING)
-def test_on_top_of_a_wrong_answer_the_right_step_follows(letter, question, step, earlier):
+@pytest.mark.parametrize(
+    ("name", "letter", "question", "step", "earlier"), weekly(FOLLOWING, dear=DEAR)
+)
+def test_on_top_of_a_wrong_answer_the_right_step_follows(name, letter, question, step, earlier):
     """Each known mistake of an earlier question in turn, until one changes the result: on that, the
     step is marked as right."""
     task = exercise(letter, "21")
@@ -68,6 +46,6 @@ def test_on_top_of_a_wrong_answer_the_right_step_follows(letter, question, step,
             assert (result.status, result.diagnosis) == ("wrong", ("follows",))
             break
     else:
-        pytest.fail(f"no mistake of {earlier.name} changes {question.name}")
+        pytest.fail(f"{name}: no mistake changes the step")
     task.check(earlier.name, earlier.answer(task))
     assert not task.check(question.name, built).follows  # the step before is right now
