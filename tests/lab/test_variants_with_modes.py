@@ -4,16 +4,17 @@ knows modes."""
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import JumpModel, cli, load_variants, simulate
+from kfcourse import JumpModel, NotFinite, cli, load_variants, simulate
 from kfcourse.exercises.notebooks import handing_out
 from kfcourse.exercises.notebooks.jobs import Outcome
-from kfcourse.filters import logic_dynamic, particle, pointmass
+from kfcourse.filters import imm, logic_dynamic, particle, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, Structures, title
 from kfcourse.lab.variants import (
@@ -207,6 +208,19 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
     assert outcome.probability[filter_.name].shape == (8, 2)
     # particles are slow
     assert [filter_.freedom + 1 for filter_ in outcome.share.values()] == [160, 160, 20]
+
+
+def test_a_filter_that_cannot_go_on_has_no_share():
+    model = JUMPS["J1-lasting"].model
+    steady = imm(Structures(model).gaussian, model.transition_at, model.first)
+
+    def step(state, y):
+        if state.step == 3:
+            raise NotFinite("step 3")
+        return steady.step(state, y)
+
+    stopped = replace(steady, name="stopped", step=step)
+    assert [*recognised([stopped, steady], model, 20, 5, 1).share] == [steady.name]
 
 
 def test_the_chapter_shows_the_shipped_table():
