@@ -207,13 +207,13 @@ ROOMS = {
     "kfcourse/continuous": 10_470,
     "kfcourse/filters": 33_090,
     "kfcourse/lab": 19_500,
-    "kfcourse/linear": 6_750,
+    "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 192_620,
+    "tests": 192_580,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
