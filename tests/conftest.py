@@ -1,7 +1,12 @@
 """Fixtures that several test files share."""
 
-import pytest
+import shlex
+from itertools import chain
 
+import pytest
+from click.testing import CliRunner
+
+from kfcourse import cli
 from kfcourse.lab import report
 from kfcourse.symbolic.model import Model
 
@@ -10,6 +15,18 @@ from kfcourse.symbolic.model import Model
 def variant53() -> Model:
     """Variant 53 of the lab, both noises multiplicative."""
     return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    """Run a command in an empty folder, as typed there; its result."""
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(*words):
+        split = (shlex.split(word) if isinstance(word, str) else [str(word)] for word in words)
+        return CliRunner().invoke(cli.main, [*chain(*split)])
+
+    return invoke
 
 
 @pytest.fixture

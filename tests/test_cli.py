@@ -4,18 +4,16 @@ import errno
 import json
 import math
 import re
-import shlex
 import time
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from kfcourse import cli
 from kfcourse.lab import report
 from kfcourse.lab.short_names import FILTERS, LAB
 
-QUICK = ("--runs", "100", "--steps", "3")
+QUICK = "--runs 100 --steps 3"
 EXAMPLE = """
 [variants.53]
 state = "c*x + e*x*v"
@@ -37,15 +35,9 @@ meter = "x + w"
 
 
 @pytest.fixture
-def call(tmp_path, monkeypatch):
-    """Run a command in an empty folder; its result."""
-    monkeypatch.chdir(tmp_path)
+def call(command, tmp_path):
     (tmp_path / "mine.toml").write_text(EXAMPLE, encoding="utf-8")
-
-    def invoke(*arguments):
-        return CliRunner().invoke(cli.main, [str(argument) for argument in arguments])
-
-    return invoke
+    return command
 
 
 @pytest.fixture
@@ -97,38 +89,35 @@ def test_one_bad_variant_is_named_and_stops_no_other(call, no_report, tmp_path):
     (tmp_path / "mine.toml").write_text(
         EXAMPLE + '[variants.bad]\nstate = "0.9*x + q"\nmeter = "x + w"\n', encoding="utf-8"
     )
-    listed = call("variants", "--variants", "mine.toml")
+    listed = call("variants --variants mine.toml")
     assert (
         listed.exit_code == 1
         and "Error: variant bad in mine.toml: unknown symbol 'q'" in listed.output
     )
     assert len(re.findall(r"no title", listed.output)) == 4
     words = "variants --variants mine.toml --variant 53 --variant bad --check --runs 1000"
-    checked = call(*words.split())
+    checked = call(words)
     assert (
         checked.exit_code == 1
         and "Error: variant bad" in checked.output
         and re.search(r"(?m)^53 ", checked.output)
     )
-    assert call("variants", "--variants", "mine.toml", "--variant", "53").exit_code == 0
-    assert call("lab", "53", "--variants", "mine.toml", *QUICK).exit_code == 0
-    refused(
-        call("lab", "bad", "--variants", "mine.toml", *QUICK), "variant bad in mine.toml", "'q'"
-    )
+    assert call("variants --variants mine.toml --variant 53").exit_code == 0
+    assert call("lab 53 --variants mine.toml", QUICK).exit_code == 0
+    refused(call("lab bad --variants mine.toml", QUICK), "variant bad in mine.toml", "'q'")
 
 
 @pytest.mark.parametrize("option", ["-h", "--help", "--version"])
 def test_help_and_version(call, option):
     assert call(option).exit_code == 0
-    assert call("lab", "--help").exit_code == 0
+    assert call("lab --help").exit_code == 0
 
 
 # --- the lab
 
 
-def test_the_lab_of_variant_53(call, tmp_path):
-    sizes = ("--runs", 1000, "--steps", 12, "--scores")
-    result = call("lab", "53", *sizes, "--out", "report", "--json", "n.json")
+def test_the_lab_of_variant_53(call, no_figures, tmp_path):
+    result = call("lab 53 --runs 1000 --steps 12 --scores --out report --json n.json")
     assert result.exit_code == 0, result.output
     assert "is more accurate than" in result.output
     scores = result.output.split("CRPS\n")[1].splitlines()
@@ -139,18 +128,13 @@ def test_the_lab_of_variant_53(call, tmp_path):
         assert set(data[key]) == names
         for values in data[key].values():
             assert len(values) == 12 and all(map(math.isfinite, values))
-    html = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
-    assert "<math" in html
-    assert not re.search(r"""(src|href)\s*=\s*["']?\s*(https?:)?//""", html)
-    images = re.findall(r'<img src="([^"]+)"', html)
-    assert images
-    assert all((tmp_path / "report" / name).is_file() for name in [*images, "report.tex"])
+    assert (tmp_path / "report" / "report.html").is_file()  # what it holds: test_report
     assert str(Path("report") / "report.html") in result.output
 
 
 @pytest.mark.slow
 def test_every_filter_can_be_chosen(call, no_report, tmp_path):
-    result = call("lab", "53", *QUICK, "--filters", ",".join(FILTERS), "--json", "n.json")
+    result = call("lab 53", QUICK, "--filters", ",".join(FILTERS), "--json n.json")
     assert result.exit_code == 0, result.output
     assert set(
         json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]
@@ -159,8 +143,8 @@ def test_every_filter_can_be_chosen(call, no_report, tmp_path):
 
 def test_a_vector_variant_works(call, no_figures, tmp_path):
     """Without a bound, unless it is asked for: that is one of particles."""
-    for options, names, bounded in (((), {*LAB}, False), (("--bound",), {*LAB, "aof-exact"}, True)):
-        result = call("lab", "20", *QUICK, *options, "--json", "n.json")
+    for options, names, bounded in (("", {*LAB}, False), ("--bound", {*LAB, "aof-exact"}, True)):
+        result = call("lab 20", QUICK, options, "--json n.json")
         assert result.exit_code == 0, result.output
         data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
         assert set(data["error_variance"]) == names
@@ -171,7 +155,7 @@ def test_a_vector_variant_works(call, no_figures, tmp_path):
 
 
 def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, no_figures, tmp_path):
-    assert call("lab", "../elsewhere", *QUICK, "--variants", "mine.toml").exit_code == 0
+    assert call("lab ../elsewhere", QUICK, "--variants mine.toml").exit_code == 0
     (folder,) = [path for path in tmp_path.iterdir() if path.is_dir()]
     assert (folder / "report.html").is_file()
     assert not list(tmp_path.parent.glob("elsewhere*"))
@@ -183,10 +167,10 @@ def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, no_figures, tmp_pa
 def test_the_same_seed_gives_the_same_bytes_whatever_the_threads_and_the_file(
     call, no_report, tmp_path
 ):
-    common = ("lab", "53", "--runs", 200, "--steps", 6, "--out", "report")
+    common = "lab 53 --runs 200 --steps 6 --out report"
     numbers = []
     for options in ("", "", "--threads 1", "--variants mine.toml", "--seed 2"):
-        assert call(*common, *options.split(), "--json", "n.json").exit_code == 0
+        assert call(common, options, "--json n.json").exit_code == 0
         numbers.append((tmp_path / "n.json").read_bytes())
     *same, of_file, other = numbers
     assert len(set(same)) == 1 and other not in same
@@ -207,11 +191,11 @@ def test_a_derivation_is_checked_line_by_line(call, tmp_path):
         ("g^2*d + 3*f^2*k^2", 2, "unknown letter 'k'"),
     ):
         file.write_text(f"{right} = {line}\n", encoding="utf-8")
-        done = call("check", file, "--variant", "53")
+        done = call("check", file, "--variant 53")
         assert done.exit_code == status
         assert says in done.output
     file.write_text(f"{right}\n", encoding="utf-8-sig")  # as Windows' Notepad may save it
-    assert call("check", file, "--variant", "53").exit_code == 0
+    assert call("check", file, "--variant 53").exit_code == 0
 
 
 @pytest.mark.parametrize(
@@ -219,7 +203,7 @@ def test_a_derivation_is_checked_line_by_line(call, tmp_path):
     [("lab 53 --filters laof gaof", "gaof"), ("solutions --out . --sets f j", "j")],
 )
 def test_names_without_a_comma_are_told_how_they_are_separated(call, words, extra):
-    done = call(*words.split())
+    done = call(words)
     assert (
         done.exit_code == 2 and f"extra argument ({extra}): separate names by commas" in done.output
     )
@@ -228,20 +212,20 @@ def test_names_without_a_comma_are_told_how_they_are_separated(call, words, extr
 @pytest.mark.parametrize(
     ("content", "options", "says"),
     [
-        (b"nonsense\n", (), "line 1: 'nonsense' has no =, and is no heading"),
-        (b"", (), "has no chain of lines, such as"),
-        (b"variant 53\n", (), "has no chain of lines, such as"),
-        (b"\xd6\xff", (), "is no text in UTF-8"),
-        (b"F = d\n", ("--variant", "999"), "no variant '999'"),
-        (b" " * 1_000_001, (), "has more than 1,000,000 bytes"),
-        (None, (), "No such file"),
+        (b"nonsense\n", "", "line 1: 'nonsense' has no =, and is no heading"),
+        (b"", "", "has no chain of lines, such as"),
+        (b"variant 53\n", "", "has no chain of lines, such as"),
+        (b"\xd6\xff", "", "is no text in UTF-8"),
+        (b"F = d\n", "--variant 999", "no variant '999'"),
+        (b" " * 1_000_001, "", "has more than 1,000,000 bytes"),
+        (None, "", "No such file"),
     ],
 )
 def test_what_is_no_derivation_is_said_in_a_sentence(call, tmp_path, content, options, says):
     file = tmp_path / "F.txt"
     if content is not None:
         file.write_bytes(content)
-    done = call("check", file, *options)
+    done = call("check", file, options)
     assert done.exit_code == 2 and says in done.output and "Traceback" not in done.output
 
 
@@ -249,6 +233,10 @@ def test_what_is_no_derivation_is_said_in_a_sentence(call, tmp_path, content, op
     ("words", "says"),
     [
         ("lab 999", ["'999'", "53, 1, 2"]),
+        (
+            "lab tan --variants mine.toml --filters aof-gaussian,fos-gaussian",
+            ["tan(x)", "aof-gaussian", "unscented"],
+        ),
         ("lab 53 --filters duof,ekf", ["'ekf'", *FILTERS]),
         *((f"lab 53 --filters '{names}'", ["at least one filter"]) for names in ("", ",", " , ")),
         *(
@@ -271,23 +259,13 @@ def test_what_cannot_be_done_is_refused_before_the_computation(
     call, no_computation, tmp_path, words, says
 ):
     (tmp_path / "bad.toml").write_text("[variants.53", encoding="utf-8")
-    refused(call(*shlex.split(words)), *says)
-
-
-def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):
-    names = "aof-gaussian,fos-gaussian"
-    line = refused(
-        call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", names),
-        "tan(x)",
-        "aof-gaussian",
-    )
-    assert "unscented" in line or "gauss_hermite" in line
+    refused(call(words), *says)
 
 
 def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(
     call, no_figures, tmp_path
 ):
-    result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--out", "r", "--json", "r.json")
+    result = call("lab tan", QUICK, "--variants mine.toml --out r --json r.json")
     assert result.exit_code == 0
     for name in ("GAOF", "GFOS", "GMFOS"):
         assert (
@@ -300,27 +278,27 @@ def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
     assert "<td>GAOF</td><td>no</td>" in page and "Which filters this model admits" in page
     assert "<td>UKF</td>" in page and "<td>GHKF</td>" in page
-    assert call("lab", "20", *QUICK, "--filters", "duof,aof-exact", "--out", "s").exit_code == 0
+    assert call("lab 20", QUICK, "--filters duof,aof-exact --out s").exit_code == 0
 
 
 def test_filters_lists_which_are_admissible(call):
-    result = call("filters", "mine.toml", "tan")
+    result = call("filters mine.toml tan")
     assert result.exit_code == 0
     lines = {line.split()[0]: line for line in result.output.splitlines()}
     assert [name for name in lines if name in FILTERS] == list(FILTERS)
     assert re.search(r" no .*tan\(x\)", lines["aof-gaussian"])
     assert lines["duof"].endswith("yes")
-    assert call("filters", "tan", "--variants", "mine.toml").output == result.output
-    assert "aof-exact" in call("filters", "53").output
-    refused(call("filters", "nothing.toml", "tan"), "nothing.toml")
-    refused(call("filters", "mine.toml", "none"), "no variant 'none'")
-    assert call("filters", "a", "b", "c").exit_code == call("filters").exit_code == 2
+    assert call("filters tan --variants mine.toml").output == result.output
+    assert "aof-exact" in call("filters 53").output
+    refused(call("filters nothing.toml tan"), "nothing.toml")
+    refused(call("filters mine.toml none"), "no variant 'none'")
+    assert call("filters a b c").exit_code == call("filters").exit_code == 2
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize("option", ["--runs 1", "--steps 0", "--seed -1", "--threads 0"])
 def test_impossible_numbers_are_refused(call, no_computation, option):
-    result = call("lab", "53", *option.split())
+    result = call("lab 53", option)
     assert result.exit_code == 2 and option.split()[0] in result.output
 
 
@@ -333,7 +311,7 @@ def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(
     monkeypatch.setattr(cli, "DERIVATION", 0.5)
     start = time.monotonic()
     names = "aof-gaussian,fos-gaussian"
-    result = call("lab", "long", *QUICK, "--variants", "long.toml", "--filters", names)
+    result = call("lab long", QUICK, "--variants long.toml --filters", names)
     line = refused(result, "aof-gaussian: its formulas", "0.5 s", "aof-unscented")
     assert time.monotonic() - start < 20
     assert "simplify" in line
@@ -349,7 +327,7 @@ def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypat
         raise error
 
     monkeypatch.setattr(cli, "write_report", failing)
-    result = call("lab", "53", *QUICK, "--json", "n.json", "--filters", "aof-gaussian,duof")
+    result = call("lab 53", QUICK, "--json n.json --filters aof-gaussian,duof")
     line = refused(result)
     assert ("RuntimeError: double subscript" in line) or ("No space left" in line)
     assert "GAOF" in result.output
@@ -364,8 +342,8 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(
     call, no_figures, tmp_path, monkeypatch
 ):
     """Of both reports: what is new appears when all of it is written."""
-    common = ("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru")
-    assert call(*common).exit_code == 0
+    common = f"lab 53 {QUICK} --filters duof --out r --report ru"
+    assert call(common).exit_code == 0
     before = snapshot(tmp_path)
 
     def ended(*arguments):
@@ -373,13 +351,11 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "write_report", ended)
-    assert call(*common, "--seed", 2).exit_code == 130
+    assert call(common, "--seed 2").exit_code == 130
     assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
 
 
 def test_a_warning_is_one_line_and_numpy_s_are_none(call, no_report):
-    result = call(
-        "lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", "aof-unscented,duof"
-    )
+    result = call("lab tan", QUICK, "--variants mine.toml --filters aof-unscented,duof")
     (line,) = [line for line in result.output.splitlines() if "may be infinite" in line]
     assert line.startswith("Warning: UKF: unscented: ")

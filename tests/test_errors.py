@@ -36,7 +36,6 @@ Y = np.zeros(3)
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: aof(MODEL), r"^aof expects a Structure, got Model: give linearised\(model\)"),
         (
             lambda: run(STRUCTURE, Y),
             r"^a run expects a Filter, got Structure linearised: give a filter",
@@ -54,6 +53,7 @@ Y = np.zeros(3)
             lambda: gaussian(FILTER),
             r"^gaussian expects a Model, got Filter aof-lin.*: give a model, .* filter",
         ),
+        (lambda: linearised(JUMPS), "got JumpModel"),  # as one without modes
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
         (
             lambda: design([MODEL], Ensemble(MODEL, 10, 2, 1)),
@@ -68,11 +68,6 @@ Y = np.zeros(3)
 def test_another_kind_of_value_is_refused_in_words(call, message):
     with pytest.raises(TypeError, match=message):
         call()
-
-
-def test_a_model_with_modes_is_no_model_without():
-    with pytest.raises(TypeError, match="got JumpModel"):
-        linearised(JUMPS)
 
 
 def test_what_a_report_says_of_an_error_survives_a_process():

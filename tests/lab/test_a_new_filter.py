@@ -8,9 +8,8 @@ import dataclasses
 
 import pytest
 import sympy as sp
-from click.testing import CliRunner
 
-from kfcourse import cli, filters
+from kfcourse import filters
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter, State
@@ -48,12 +47,10 @@ def recipe(monkeypatch):
         monkeypatch.setitem(short_names.FILTERS, name, entry)
 
 
-def test_a_filter_added_by_the_recipe_is_known_everywhere(recipe, tmp_path):
+def test_a_filter_added_by_the_recipe_is_known_everywhere(recipe, no_figures, command, tmp_path):
     names = "aof-gaussian,fading-gaussian,fading-linearised"
-    size = ["--runs", "1000", "--steps", "4"]
-    done = CliRunner().invoke(
-        cli.main, ["lab", "53", "--filters", names, *size, "--report", "ru", "--out", str(tmp_path)]
-    )
+    size = "--runs 1000 --steps 4 --report ru --out ."
+    done = command("lab 53 --filters", names, size)
     assert done.exit_code == 0, done.output
     assert "GFading" in done.output
     text = (tmp_path / "report.html").read_text("utf-8")

@@ -1,19 +1,10 @@
-"""Which filter may I use?  Refusals and warnings against what is known of the models, and the lab
-without the refused."""
+"""Which filter may I use?  Refusals and warnings against what is known of the models."""
 
-import re
-import warnings
-
-import numpy as np
 import pytest
 
-from kfcourse.filters import aof, duof
 from kfcourse.lab.admission import admissions, table
-from kfcourse.lab.short_names import FILTERS, lab_filters
-from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.experiment import compare
+from kfcourse.lab.short_names import FILTERS
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import gaussian
 
 pytestmark = pytest.mark.quick
 
@@ -95,56 +86,3 @@ def test_a_line_for_each_filter():
     lines = table(result).splitlines()
     assert lines[0].split() == ["duof", "DUOF", "yes"]
     assert lines[1] == "aof-exact  exact AOF  yes"
-
-
-def test_a_comparison_goes_on_without_the_filters_that_fail():
-    """A filter that becomes infinite is named, and the comparison is that of the others."""
-    model = Model.define("0.9*x + 0.3*v", "x + w")
-
-    def broken(name):
-        good = aof(gaussian(model))
-
-        def step(state, y):
-            after = good.step(state, y)
-            mean = after.posterior.mean * (np.inf if state.step == 2 else 1.0)
-            return after._replace(posterior=after.posterior._replace(mean=mean))
-
-        return type(good)(name, model, good.init, step)
-
-    size, options = (model, 300, 4, 1), {"jobs": 1, "progress": False}
-    good = [duof(model), aof(gaussian(model))]
-    result = compare([broken("one"), good[0], broken("two"), good[1]], *size, **options)
-    assert result.names == ("duof", "aof-gaussian") and list(result.left_out) == ["one", "two"]
-    assert (
-        "one became infinite or NaN" in str(result.left_out["one"])
-        and result.left_out["one"].kind == "infinite"
-    )
-    with pytest.raises(KeyError, match="no results for 'one': step 2: one became infinite"):
-        result.error_variance("one")
-    np.testing.assert_array_equal(
-        result.error_variance("duof").value,
-        compare(good, *size, **options).error_variance("duof").value,
-    )
-    with pytest.raises(NotFinite, match="every filter fails"):
-        compare([broken("two")], *size, **options)
-    endless = Model.define("x**3 + v", "x + w")
-    with pytest.raises(NotFinite, match="trajectories become infinite"):
-        compare([duof(endless)], endless, 300, 20, 1, **options)
-
-
-def test_a_negative_variance_is_the_affair_of_its_filter():
-    """The Gaussian formulas of this meter cancel in doubles; the other filters are compared as if
-    it were not there."""
-    model = Model.define("0.9*x + 0.1*v", "(1 + x)**16*(1 + x)**8 + w")
-
-    size, options = (model, 500, 40, 1), {"jobs": 1, "progress": False}
-    names = ("mfos-gaussian", "aof-gaussian", "aof-unscented")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        filters = lab_filters(model, names)
-    result = compare(filters, *size, **options)
-    assert result.names == names[1:]
-    failed = r"step \d+: mfos-gaussian (failed: a covariance has the variance -|became infinite)"
-    assert re.match(failed, str(result.left_out["mfos-gaussian"]))
-    expected = compare(filters[1:], *size, **options).error_variance("aof-gaussian").value
-    np.testing.assert_array_equal(result.error_variance("aof-gaussian").value, expected)

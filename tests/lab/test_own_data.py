@@ -7,13 +7,13 @@ from functools import partial
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from matplotlib.figure import Figure
 
-from kfcourse import Model, cli, linearised, run, smooth
+from kfcourse import Model, linearised, run, smooth
 from kfcourse.filters import aof, gated
 from kfcourse.lab import own_data
 from kfcourse.lab.own_data import estimate_record, model_of
+from kfcourse.records import estimate
 from kfcourse.records.reading import read_measurements
 
 MODELS = """
@@ -74,11 +74,8 @@ def place(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def call(place):
-    def invoke(*arguments):
-        return CliRunner().invoke(cli.main, ["estimate", *map(str, arguments)])
-
-    return invoke
+def call(command, place):
+    return partial(command, "estimate")
 
 
 def numbers(path):
@@ -128,8 +125,8 @@ def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
 def test_the_command_writes_numbers_and_a_report(call, place):
     times, _, y = practitioner_s_track(3)
     written(place / "track.csv", times[:60], y[:60])
-    call = partial(call, "track.csv", "--model", "my.toml", "--variant", "plane", "--out", "out")
-    result = call("--gate", 0.999, "--track", "x,z")
+    call = partial(call, "track.csv --model my.toml --variant plane --out out")
+    result = call("--gate 0.999 --track x,z")
     assert result.exit_code == 0, result.output
     assert (
         "60 rows, " in result.output
@@ -165,53 +162,54 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         assert sentence.split(":")[0] in html
 
 
-def test_times_keep_all_their_digits_and_a_gate_may_judge_components(call, place):
+def test_times_keep_all_their_digits_and_a_gate_may_judge_components(no_figures, call, place):
     """Stamps of Unix have ten digits before the point."""
     stamps = [1484649904.25 + 0.5 * k for k in range(6)]
     rows = [f"{stamp},{1 + k % 2},{1e3 if k == 3 else 1}" for k, stamp in enumerate(stamps)]
     (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows]))
-    names = ("--model", "my.toml", "--variant", "plane", "--gate", "0.999", "--out", "out")
-    arguments = ("stamps.csv", *names)
-    assert "refused 1 of 6 measurements: rows 4" in call(*arguments, "--by-component").output
+    arguments = "stamps.csv --model my.toml --variant plane --gate 0.999 --out out"
+    assert "refused 1 of 6 measurements: rows 4" in call(arguments, "--by-component").output
     table = numbers(place / "out" / "estimate.csv")
     np.testing.assert_array_equal(table["time"], stamps)
     np.testing.assert_array_equal(table["weight"], [1, 1, 1, 0.5, 1, 1])
     (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows[:2], rows[0]]))
-    assert "1484649904.25 comes after 1484649904.75" in call(*arguments).output
+    assert "1484649904.25 comes after 1484649904.75" in call(arguments).output
 
 
-def test_the_model_in_the_help_can_be_copied(call, place):
+def test_the_model_in_the_help_can_be_copied(no_figures, call, place):
     model = re.search(r"(\[variants.*?)\n\nOptions:", call("--help").output, re.DOTALL)[1]
     (place / "copied.toml").write_text(model)
-    result = call("line.csv", "--model", "copied.toml", "--unknown", "q,r", "--positive", "q,r")
+    result = call("line.csv --model copied.toml --unknown q,r --positive q,r")
     assert result.exit_code == 0 and "Report: estimate-line/report.html" in result.output
 
 
-def test_unknown_parameters_are_found_first(call, place):
+def test_unknown_parameters_are_found_first(no_figures, call, place, monkeypatch):
     times, _, y = practitioner_s_track(4)
-    written(place / "line.csv", times[:120], y[:120, :1])
+    written(place / "line.csv", times[:40], y[:40, :1])
     (place / "mine.toml").write_text(
         '[variants.walk]\nstate = "x + sqrt(q*dt)*v"\nmeter = "x + sqrt(r)*w"\nparameters = { q = '
         "100, r = 100 }\n"
         "inputs = { dt = [1] }\nprior = { mean = 0, variance = 1e4 }\n"
     )
-    result = call("line.csv", "--model", "mine.toml", "--unknown", "q,r", "--positive", "q, r")
+    asked = []
+
+    def heard(model, y, unknown, positive, build):
+        asked.append((unknown, positive, estimate(model, y, unknown, positive, build)))
+        return asked[-1][2]
+
+    monkeypatch.setattr(own_data, "estimate", heard)
+    result = call("line.csv --model mine.toml --unknown q,r --positive 'q, r'")
     assert result.exit_code == 0, result.output
     columns = {
         name: float(value)
         for name, value in re.findall(r"^(q|r) = (\S+) ±", result.output, re.MULTILINE)
     }
-    analysis = estimate_record(
-        place / "line.csv",
-        model_of(place / "mine.toml", None),
-        unknown=["q", "r"],
-        positive=["q", "r"],
-    )
-    assert columns == pytest.approx(
-        dict(zip(analysis.likeliest.names, analysis.likeliest.value, strict=True)), rel=1e-3
-    )
+    ((unknown, positive, likeliest),) = asked
+    assert unknown == positive == ["q", "r"]
+    expected = dict(zip(likeliest.names, likeliest.value, strict=True))
+    assert columns == pytest.approx(expected, rel=1e-3)
     assert (place / "estimate-line" / "estimate.csv").is_file()
-    unfit = call("line.csv", "--model", "mine.toml", "--unknown", "x")
+    unfit = call("line.csv --model mine.toml --unknown x")
     assert unfit.exit_code == 1 and "unknown must name parameters" in unfit.output
 
 
@@ -234,31 +232,31 @@ def test_every_filter_of_the_option(place, structure):
     ("arguments", "code", "words"),
     [
         (
-            ["missing.csv", "--model", "my.toml", "--variant", "line"],
+            "missing.csv --model my.toml --variant line",
             1,
             ["no file of measurements at missing.csv"],
         ),
-        (["line.csv", "--model", "my.toml"], 1, ["3 models; say which", "--variant plane"]),
-        (["line.csv", "--model", "my.toml", "--variant", "plane"], 1, ["no column 'y1'"]),
-        (["line.csv", "--model", "my.toml", "--variant", "line", "--column", "y"], 2, ["--column"]),
+        ("line.csv --model my.toml", 1, ["3 models; say which", "--variant plane"]),
+        ("line.csv --model my.toml --variant plane", 1, ["no column 'y1'"]),
+        ("line.csv --model my.toml --variant line --column y", 2, ["--column"]),
         (
-            ["line.csv", "--model", "my.toml", "--variant", "line", "--track", "x,q"],
+            "line.csv --model my.toml --variant line --track x,q",
             2,
             ["there are x"],
         ),
-        (["bad.csv", "--model", "my.toml", "--variant", "line"], 1, ["bad.csv, line 3, column y"]),
+        ("bad.csv --model my.toml --variant line", 1, ["bad.csv, line 3, column y"]),
         (
-            ["wild.csv", "--model", "my.toml", "--variant", "line"],
+            "wild.csv --model my.toml --variant line",
             1,
             ["wild.csv: row 2, time 1, cannot be judged", "--gate"],
         ),
         (
-            ["negative.csv", "--model", "my.toml", "--variant", "root"],
+            "negative.csv --model my.toml --variant root",
             1,
             ["state's noise from step 1 to 2 has a negative variance, -1"],
         ),
         (
-            ["line.csv", "--model", "my.toml", "--variant", "line", "--out", "my.toml"],
+            "line.csv --model my.toml --variant line --out my.toml",
             1,
             ["cannot go to my.toml"],
         ),
@@ -269,7 +267,7 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, argumen
     (place / "wild.csv").write_text("time,y\n0,1\n1,1e300\n2,1\n")
     (place / "negative.csv").write_text("time,y,u\n0,1,1\n1,1,-1\n2,1,1\n")
     before = sorted(place.iterdir())
-    result = call(*arguments)
+    result = call(arguments)
     assert result.exit_code == code and isinstance(result.exception, SystemExit)
     assert "Traceback" not in result.output
     for word in words:
@@ -277,8 +275,8 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, argumen
     assert sorted(place.iterdir()) == before
 
 
-def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
-    call = partial(call, "line.csv", "--model", "my.toml", "--variant", "line", "--out", "out")
+def test_a_report_that_fails_leaves_what_was_there(no_figures, call, place, monkeypatch):
+    call = partial(call, "line.csv --model my.toml --variant line --out out")
     assert call().exit_code == 0
     before = {path: path.read_bytes() for path in (place / "out").iterdir()}
 
@@ -286,6 +284,6 @@ def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
         raise RuntimeError("no pictures today")
 
     monkeypatch.setattr(own_data, "save_figure", broken)
-    result = call("--gate", 0.9)
+    result = call("--gate 0.9")
     assert result.exit_code == 1 and "no pictures today" in result.output
     assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before

@@ -4,14 +4,14 @@ intended reason, proposals."""
 import re
 import tomllib
 from collections import Counter
+from functools import partial
 from itertools import product
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from weekly import weekly
 
-from kfcourse import Model, cli, load_variants
+from kfcourse import Model, load_variants
 from kfcourse.exercises.checks.posing import unposed
 from kfcourse.lab import grammar, quality
 from kfcourse.lab.grammar import PIECES, generate, propose
@@ -47,9 +47,9 @@ def variant(state, meter, parameters=None, **options):
 @pytest.mark.parametrize("name", weekly([(name,) for name in SHIPPED]))
 def test_a_shipped_variant_is_well_posed(name):
     """In variant 12 the filters differ by a thousandth only, in 53 by a few tails: that takes more
-    trajectories to see."""
-    vector = SHIPPED[name].model.n > 1  # gets an eighth
-    quality_ = examine(SHIPPED[name], 20_000 if vector or name in ("12", "53") else 4_000)
+    trajectories to see; and a vector gets an eighth."""
+    more = {"12": 20_000, "53": 20_000, "20": 8_000, "21": 8_000}
+    quality_ = examine(SHIPPED[name], more.get(name, 4_000))
     assert quality_.well_posed, quality_.faults
     assert quality_.linear == (name == "1")
     assert quality_.findings["filters differ"].ok == (name != "1")
@@ -315,7 +315,7 @@ def test_no_two_pieces_of_an_equation_share_a_parameter():
 
 @pytest.fixture(scope="module")
 def generated():
-    return generate(1, seed=1, runs=512, jobs=1)
+    return generate(1, seed=5, runs=512, jobs=1)
 
 
 def test_what_is_generated_is_read_back(generated, tmp_path):
@@ -329,7 +329,7 @@ def test_what_is_generated_is_read_back(generated, tmp_path):
 
 @pytest.mark.slow
 def test_the_same_seed_generates_the_same_text_whatever_the_processes(generated):
-    again = generate(1, seed=1, runs=512, jobs=2)
+    again = generate(1, seed=5, runs=512, jobs=2)
     assert again.toml() == generated.toml()
     assert again.rejected == generated.rejected
 
@@ -388,23 +388,18 @@ def test_a_search_without_end_is_given_up_and_formulas_are_seldom_repeated(judge
 
 
 @pytest.fixture
-def call(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def invoke(*arguments):
-        return CliRunner().invoke(cli.main, ["variants", *map(str, arguments)])
-
-    return invoke
+def call(command):
+    return partial(command, "variants")
 
 
 def test_check_says_by_its_status_whether_all_are_well_posed(call, tmp_path):
-    result = call("--check", "--variant", "1", "--runs", 512, "--jobs", 1)
+    result = call("--check --variant 1 --runs 512 --jobs 1")
     assert result.exit_code == 0, result.output
     assert "equal" in result.stdout and "not well posed" not in result.output
     (tmp_path / "mine.toml").write_text(
         '[variants.boom]\nstate = "1.2*x + v"\nmeter = "x**2 + x + w"\n', encoding="utf-8"
     )
-    result = call("--check", "--variants", "mine.toml", "--runs", 256, "--jobs", 1)
+    result = call("--check --variants mine.toml --runs 256 --jobs 1")
     assert result.exit_code == 1
     assert "variant boom is not well posed, bounded: the second moment grows" in result.stdout
 
@@ -423,14 +418,14 @@ def quick(monkeypatch):
 
 
 def test_proposals_are_printed_or_go_to_a_new_file(call, quick, tmp_path):
-    result = call("--generate", 2, "--seed", 9)
+    result = call("--generate 2 --seed 9")
     assert result.exit_code == 0
     assert list(tomllib.loads(result.stdout)["variants"]) == ["g1", "g2"]
     assert result.stdout.startswith(
         "# Made by: kfcourse variants --generate 2 --seed 9 --runs 40000\n"
     )
     assert result.stderr == "4 candidates rejected: 3 bounded, 1 linear\n"
-    result = call("--generate", 3, "--out", "new.toml")  # too few are written, and it is said
+    result = call("--generate 3 --out new.toml")  # too few are written, and it is said
     assert (result.exit_code, result.stdout) == (1, "")
     assert "only 2 of 3 variants found" in result.stderr
     assert list(load_variants(tmp_path / "new.toml")) == ["g1", "g2"]
@@ -444,7 +439,7 @@ def test_a_bad_out_is_refused_before_the_computation(call, tmp_path, monkeypatch
     monkeypatch.setattr(grammar, "generate", lambda *_: pytest.fail("the computation began"))
     (tmp_path / "old.toml").write_text("precious", encoding="utf-8")
     (tmp_path / "dangling").symlink_to("nowhere")
-    result = call("--generate", 1, "--out", out)
+    result = call("--generate 1 --out", out)
     assert result.exit_code == 1
     assert f"cannot go to {out}" in result.stderr
     assert (tmp_path / "old.toml").read_text(encoding="utf-8") == "precious"
@@ -453,18 +448,18 @@ def test_a_bad_out_is_refused_before_the_computation(call, tmp_path, monkeypatch
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("--generate", 201),
-        ("--generate", 1, "--check"),
-        ("--generate", 1, "--variant", "53"),
-        ("--generate", 1, "--variants", "mine.toml"),
-        ("--check", "--out", "new.toml"),
-        ("--out", "new.toml"),
+        "--generate 201",
+        "--generate 1 --check",
+        "--generate 1 --variant 53",
+        "--generate 1 --variants mine.toml",
+        "--check --out new.toml",
+        "--out new.toml",
     ],
 )
 def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
     for module, name in ((grammar, "generate"), (quality, "examine_all")):
         monkeypatch.setattr(module, name, lambda *_: pytest.fail("the computation began"))
-    result = call(*arguments)
+    result = call(arguments)
     assert result.exit_code == 2
     assert "Traceback" not in result.output
 
@@ -472,12 +467,12 @@ def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--variant", "999"], "no variant '999'; there are 53, 1, 2"),
-        (["--variants", "nothing.toml"], "nothing.toml"),
-        (["--variants", "mine.toml"], "variant a in mine.toml"),
+        ("--variant 999", "no variant '999'; there are 53, 1, 2"),
+        ("--variants nothing.toml", "nothing.toml"),
+        ("--variants mine.toml", "variant a in mine.toml"),
     ],
 )
 def test_what_cannot_be_checked_is_named(call, tmp_path, arguments, message):
     (tmp_path / "mine.toml").write_text('[variants.a]\nstate = "x + v"\nmeter = "3 + w"\n')
-    result = call("--check", *arguments)
+    result = call("--check", arguments)
     assert result.exit_code == 1 and message in result.stderr

@@ -17,6 +17,8 @@ from kfcourse.lab.report_text import written_lines
 from kfcourse.lab.short_names import LAB, Structures, judging
 from kfcourse.lab.variants import find_variant, read_variant
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 WALK = {
     "drift": ["a*x1 - x1**3 + u", "x1 - x2 + sin(t)"],
     "diffusion": [["s*x1", "0.4"], ["0", "-1"]],

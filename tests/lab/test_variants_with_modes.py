@@ -5,13 +5,13 @@ import json
 import re
 import tomllib
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from kfcourse import JumpModel, NotFinite, cli, compare, load_variants, simulate
+from kfcourse import JumpModel, NotFinite, compare, load_variants, simulate
 from kfcourse.exercises.notebooks import handing_out
 from kfcourse.exercises.notebooks.jobs import Outcome
 from kfcourse.filters import imm, logic_dynamic, particle, pointmass
@@ -41,10 +41,6 @@ first = [1, 0]
 state = "0.9*x + v"
 meter = "x + w"
 """
-
-
-def kfcourse(*arguments):
-    return CliRunner().invoke(cli.main, [str(each) for each in arguments])
 
 
 @pytest.fixture
@@ -81,10 +77,11 @@ def test_each_has_its_filters_and_finite_trajectories(name):
     assert np.isfinite(simulate(JUMPS[name].model, 200, 51, seed=1).x).all()
 
 
-def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, own):
-    few = ("--runs", 2000, "--steps", 6)
-    places = ("--out", tmp_path / "r", "--json", tmp_path / "n.json")
-    result = kfcourse("lab", "mine", "--variants", own, *few, *places)
+def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(
+    command, no_figures, tmp_path, own
+):
+    few = "--runs 2000 --steps 6 --out r --json n.json"
+    result = command("lab mine --variants mine.toml", few)
     assert result.exit_code == 0, result.output
     for name in JUMP_LAB:
         assert title(name) in result.output
@@ -102,8 +99,8 @@ def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, o
     assert gaps["gpb2"] < gaps["aof-jump-gaussian"] < gaps["aof-averaged"]
 
 
-def test_listed_and_checked(own):
-    listed = kfcourse("variants", "--variant", "J1").output
+def test_listed_and_checked(command, own):
+    listed = command("variants --variant J1").output
     assert listed.count("x' = ") == 1 and "        sound: C = 1\n        faulty: C = 10\n" in listed
     modes = {"sound": {}, "cubic": {"meter": "x**3 +\n C*w", "parameters": {"C": 2}}}
     table = {"state": "x + v", "meter": ["x + C*w"], "parameters": {"C": 1, "T": 1}, "modes": modes}
@@ -112,32 +109,32 @@ def test_listed_and_checked(own):
         "        sound: x' = x + v;  y = x + C*w;  C = 1",
         "        cubic: x' = x + v;  y = x**3 + C*w;  C = 2",
     ]
-    checked = kfcourse("variants", "--variants", own, "--variant", "mine", "--check", "--runs", 256)
+    checked = command("variants --variants mine.toml --variant mine --check --runs 256")
     assert (
         checked.exit_code == 0
         and "has 2 modes: only whether it is bounded is checked" in checked.output
     )
 
 
-def test_filters_are_told_for_modes():
-    printed = kfcourse("filters", "J1").output
+def test_filters_are_told_for_modes(command):
+    printed = command("filters J1").output
     assert "LD-GAOF" in printed and "GPB2" in printed and "particle" not in printed
     assert "LD-GFKP4" in printed and "LD-LFBP4" in printed
     assert title("fbp2-jump-linearised") == "LD-LFBP2"
-    wrong = kfcourse("lab", "J1", "--filters", "aof-gaussian")
+    wrong = command("lab J1 --filters aof-gaussian")
     assert (
         wrong.exit_code == 1
         and "unknown filter 'aof-gaussian'; known: aof-jump-gaussian" in wrong.output
     )
 
 
-def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
+def test_where_nothing_knows_modes_it_is_said(command, tmp_path, own):
     (tmp_path / "y.csv").write_text("y\n1\n2\n")
     for arguments in (
-        ("exercises", "--sets", "a", "--jobs", 1, "--variant", "J1", "--out", tmp_path / "e"),
-        ("estimate", tmp_path / "y.csv", "--model", own, "--variant", "mine"),
+        "exercises --sets a --jobs 1 --variant J1 --out e",
+        "estimate y.csv --model mine.toml --variant mine",
     ):
-        result = kfcourse(*arguments)
+        result = command(arguments)
         assert result.exit_code != 0 and "jumps between modes" in result.output, (
             arguments,
             result.output,
@@ -149,25 +146,25 @@ def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
         find_variant("J1").plain("the exercises")
 
 
-def test_nobody_gets_a_variant_with_modes_and_it_is_said(tmp_path, own, monkeypatch):
+def test_nobody_gets_a_variant_with_modes_and_it_is_said(command, tmp_path, own, monkeypatch):
     monkeypatch.setattr(
         handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work]
     )
     (tmp_path / "list.csv").write_text("name,group\nA,1\nB,1\n")
-    command = ("exercises", "--variants", own, "--sets", "a", "--out", tmp_path / "e")
-    for whom in (["--all"], ["--students", tmp_path / "list.csv"]):
-        result = kfcourse(*command, *whom)
+    call = partial(command, "exercises --variants mine.toml --sets a --out e")
+    for whom in ("--all", "--students list.csv"):
+        result = call(whom)
         assert result.exit_code == 0 and re.search(
             "Left out, since they jump between modes.*: mine\n", result.output
         )
     assert "mine" not in (tmp_path / "e" / "assignment.csv").read_text()
-    named = kfcourse(*command, "--variant", "plain")
+    named = call("--variant plain")
     assert named.exit_code == 0 and "Left out" not in named.output
-    several = kfcourse(*command, "--variant", "mine")
+    several = call("--variant mine")
     assert several.exit_code == 1 and several.output.count("jumps between modes") == 1
     own.write_text(OWN.partition("[variants.plain]")[0])
-    for whom in (["--all"], ["--students", tmp_path / "list.csv"]):
-        result = kfcourse(*command, *whom)
+    for whom in ("--all", "--students list.csv"):
+        result = call(whom)
         assert (
             result.exit_code == 1
             and "no other variants than those that jump between modes" in result.output
@@ -181,10 +178,10 @@ def test_nobody_gets_a_variant_with_modes_and_it_is_said(tmp_path, own, monkeypa
         ("transition", "transitions"),
     ],
 )
-def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
+def test_a_wrong_table_is_refused_with_its_name(command, tmp_path, change, message):
     path = tmp_path / "wrong.toml"
     path.write_text(OWN.replace(change, message))
-    result = kfcourse("lab", "mine", "--variants", path)
+    result = command("lab mine --variants", path)
     assert (
         result.exit_code == 1
         and "variant mine in" in result.output
@@ -212,10 +209,8 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*load_variants(), *JUMPS])
-def test_the_lab_takes_every_variant_that_is_shipped(name, tmp_path):
-    sizes = ["--runs", "40", "--steps", "4", "--jobs", "1"]
-    options = ["--scores", "--out", str(tmp_path / "report")]
-    result = CliRunner().invoke(cli.main, ["lab", name, *sizes, *options])
+def test_the_lab_takes_every_variant_that_is_shipped(name, command, tmp_path):
+    result = command("lab", name, "--runs 40 --steps 4 --jobs 1 --scores --out report")
     assert result.exit_code == 0, result.output
     assert "exact AOF left out" not in result.output
     assert (tmp_path / "report" / "report.html").exists()
