@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from kfcourse import Model, gaussian, linearised, simulate
-from kfcourse.lab.variants import load_variants
+from kfcourse import Model, gaussian, linearised, load_variants, simulate
 from kfcourse.pages import explore, scenes
 from kfcourse.pages.exponents import log_normal
 

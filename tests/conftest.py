@@ -6,9 +6,8 @@ from itertools import chain
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import cli
+from kfcourse import Model, cli
 from kfcourse.lab import report
-from kfcourse.symbolic.model import Model
 
 
 @pytest.fixture(scope="session")

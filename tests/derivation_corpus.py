@@ -24,6 +24,7 @@ from itertools import islice
 
 import sympy as sp
 
+from kfcourse import GaussianMoments, Model, NoClosedForm, load_variants
 from kfcourse.exercises.derivations.terms import (
     CALL,
     LETTER,
@@ -46,10 +47,7 @@ from kfcourse.exercises.derivations.terms import (
 )
 from kfcourse.exercises.derivations.typed import read_line
 from kfcourse.exercises.derivations.worked import plain, stages
-from kfcourse.lab import load_variants
 from kfcourse.symbolic.formula import symbol
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 
 LAWS = (None, None, ("mu", "P"), ("lambda", "Psi"))
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from kfcourse import cli
-from kfcourse.lab import report
-from kfcourse.lab.short_names import FILTERS, LAB
+from kfcourse.lab import FILTERS, LAB, report
 
 QUICK = "--runs 100 --steps 3"
 EXAMPLE = """

@@ -20,14 +20,9 @@ from hypothesis import HealthCheck, Phase, assume, event, given, settings
 from hypothesis import strategies as st
 from latex2mathml.converter import convert
 
-from kfcourse import (
-    FormulaError,
-    Model,
-    ModelError,
-    simulate,
-)
-from kfcourse.lab.variants import KEYS, VariantError, read_variant
-from kfcourse.symbolic.angular import AngleWarning
+from kfcourse import AngleWarning, FormulaError, Model, ModelError, simulate
+from kfcourse.lab import VariantError, read_variant
+from kfcourse.lab.variants import KEYS
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.formula import FUNCTIONS, parse, symbol
 from kfcourse.symbolic.model import nothing_random

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_normal
 
+from kfcourse import Gaussian
 from kfcourse.filters.designed import Scatter
 from kfcourse.laws import (
-    Gaussian,
     Measurement,
     NegativeVariance,
     apply,

@@ -11,24 +11,29 @@ import sympy as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import (
+    FormulaError,
     Model,
+    ModelError,
+    NoClosedForm,
+    NotFinite,
     compare,
     gauss_hermite,
     gaussian,
     likelihood,
     linearised,
     predictions,
+    read_measurements,
     run,
+    simulate,
     smooth,
     unscented,
 )
 from kfcourse.continuous import benes_filter, moment_equations, sampled
-from kfcourse.errors import NotFinite
 from kfcourse.filters import aof, duof, fos, kalman_filter
-from kfcourse.lab.variants import VariantError, find_variant, read_variant, summary
+from kfcourse.lab import VariantError, find_variant, read_variant
+from kfcourse.lab.variants import summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
-from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.records import estimate, read_measurements
+from kfcourse.records import estimate
 from kfcourse.scenarios.benchmarks import (
     DOUBLE_WELL,
     EXACT_MUL,
@@ -37,9 +42,6 @@ from kfcourse.scenarios.benchmarks import (
     exact_mul,
     jimenez_data,
 )
-from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
 

@@ -14,6 +14,7 @@ import scipy.linalg
 import sympy as sp
 from numpy.testing import assert_allclose
 
+from kfcourse import FormulaError, Gaussian, ModelError, NotFinite, linearised, predictions, run
 from kfcourse.continuous import (
     ContinuousModel,
     extended_kalman_bucy,
@@ -25,13 +26,7 @@ from kfcourse.continuous import (
     to_discrete,
 )
 from kfcourse.filters import aof
-from kfcourse.laws import Gaussian
-from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.experiment import predictions, run
 from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import linearised
 
 pytestmark = pytest.mark.quick
 

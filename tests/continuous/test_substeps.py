@@ -6,12 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.sparse.linalg
+from numpy.testing import assert_allclose
 
-from kfcourse import compare, gaussian, likelihood, linearised, predictions, run
+from kfcourse import compare, gaussian, likelihood, linearised, predictions, run, simulate
 from kfcourse.continuous import benes_filter, sampled
 from kfcourse.filters import aof, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
-from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import states
 from kfcourse.scenarios.benchmarks import benes
 
@@ -106,7 +106,7 @@ def test_kalmans_filter_where_the_object_is_linear():
         for ours, kalman in zip(
             law(pointmass(model), y), law(aof(linearised(model)), y), strict=True
         ):
-            np.testing.assert_allclose(ours, kalman, rtol=0, atol=2e-5)
+            assert_allclose(ours, kalman, rtol=0, atol=2e-5)
     # two of them would do
     assert {state.memory.substeps for state in states(pointmass(model), y)[1:]} == {4}
 

@@ -3,14 +3,11 @@
 import control
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from kfcourse import Model, ModelError, run, simulate
-from kfcourse.filters.alphabeta import (
-    alpha_beta,
-    steady_alpha,
-    steady_beta,
-    tracking_index,
-)
+from kfcourse.filters import alpha_beta
+from kfcourse.filters.alphabeta import steady_alpha, steady_beta, tracking_index
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
 
@@ -34,7 +31,7 @@ def test_the_coefficients_are_the_stationary_kalman_gain(alpha):
     gain = predicted @ system.H.T / (system.H @ predicted @ system.H.T + system.R)
     # The Riccati equation loses digits where the noises differ much: alpha = 0.01 has an index of
     # 5e-5, squared 2.5e-9.
-    np.testing.assert_allclose(gain[:, 0], [alpha, steady_beta(alpha) / T], rtol=1e-6)
+    assert_allclose(gain[:, 0], [alpha, steady_beta(alpha) / T], rtol=1e-6)
 
 
 # --- the estimates
@@ -73,7 +70,7 @@ def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop():
             expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta)
             for k, values in enumerate(expected):
                 if values[0] is not None:  # nothing is known before the first measurement
-                    np.testing.assert_allclose(
+                    assert_allclose(
                         mean[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING
                     )
 

@@ -8,6 +8,23 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
+from kfcourse import (
+    AngleWarning,
+    Ensemble,
+    Gaussian,
+    Model,
+    ModelError,
+    QuadratureWarning,
+    compare,
+    design,
+    gauss_hermite,
+    gaussian,
+    linearised,
+    predictions,
+    run,
+    simulate,
+    unscented,
+)
 from kfcourse.angles import difference, moments_on_circle, wrapped
 from kfcourse.filters import (
     aof,
@@ -23,17 +40,8 @@ from kfcourse.filters import (
 )
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.optimal_structure import Memory, Remembered
-from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees
-from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Ensemble, simulate
-from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.scenarios.navigation import Dynamics, Sensor, fuse, observe
-from kfcourse.symbolic.angular import AngleWarning
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
-from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
 

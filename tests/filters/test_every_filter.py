@@ -57,7 +57,7 @@ from kfcourse.filters import (
     robust,
 )
 from kfcourse.filters.alphabeta import steady_beta
-from kfcourse.lab.variants import find_variant
+from kfcourse.lab import find_variant
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.scenarios.radar import kinematic
 

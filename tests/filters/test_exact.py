@@ -9,7 +9,7 @@ from kfcourse import Model, ModelError, filters, load_variants, run, simulate
 from kfcourse.filters import kalman_filter
 from kfcourse.filters.exact import pointmasses
 from kfcourse.filters.exact.pointmasses import Unresolved
-from kfcourse.lab.short_names import has_exact
+from kfcourse.lab import has_exact
 from kfcourse.montecarlo.experiment import states
 from kfcourse.scenarios.benchmarks import inverse_cube_root
 from kfcourse.symbolic.equations import compile_model

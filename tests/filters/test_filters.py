@@ -9,25 +9,11 @@ import sympy as sp
 from numpy.testing import assert_allclose
 from test_every_filter import OF_MEASUREMENTS, STRUCTURES
 
-from kfcourse.filters import EQUATIONS
+from kfcourse import Ensemble, Model, NotFinite, design, linearised, run, simulate
+from kfcourse.filters import EQUATIONS, Design, aof, dfmp, duof, fbp, fos, mdfmp, mfos
 from kfcourse.filters import notation as s
-from kfcourse.filters.approximations import aof
-from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.designed import Design
-from kfcourse.filters.optimal_structure import (
-    ESTIMATES,
-    MEASUREMENTS,
-    dfmp,
-    fbp,
-    fos,
-    mdfmp,
-    mfos,
-)
-from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
-from kfcourse.montecarlo.experiment import run
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import linearised
+from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS
+from kfcourse.montecarlo.ensemble import Instant
 
 pytestmark = pytest.mark.quick
 

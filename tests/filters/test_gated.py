@@ -8,7 +8,9 @@ from scipy.stats import chi2
 from test_every_filter import READY
 
 from kfcourse import (
+    Ensemble,
     Model,
+    design,
     gaussian,
     likelihood,
     linearised,
@@ -17,20 +19,8 @@ from kfcourse import (
     simulate,
     smooth,
 )
-from kfcourse.filters import (
-    aof,
-    duof,
-    fos,
-    gated,
-    imm,
-    kalman_filter,
-    mfos,
-    particle,
-    pointmass,
-)
+from kfcourse.filters import aof, duof, fos, gated, imm, kalman_filter, mfos, particle, pointmass
 from kfcourse.linear.consistency import innovations
-from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.records import weights
 
 pytestmark = pytest.mark.quick

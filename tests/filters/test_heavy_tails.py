@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from kfcourse import Model, linearised, run
 from kfcourse.filters import robust
@@ -48,8 +49,8 @@ def test_it_settles_where_weight_and_law_agree(plane, rows, weigh, parameter, op
         z = p @ (
             np.linalg.solve(PRIOR_COV, PRIOR_MEAN) + w[i] * H.T @ np.linalg.solve(R, y[0, i, rows])
         )
-        np.testing.assert_allclose(law.mean[0, i], z, rtol=1e-9)
-        np.testing.assert_allclose(law.cov[0, i], p, rtol=1e-9, atol=1e-15)
+        assert_allclose(law.mean[0, i], z, rtol=1e-9)
+        assert_allclose(law.cov[0, i], p, rtol=1e-9, atol=1e-15)
         r, trace = y[0, i, rows] - H @ z, np.trace(np.linalg.solve(R, H @ p @ H.T))
         expected = weigh(parameter, r @ np.linalg.solve(R, r), trace, len(rows))
         assert w[i] == pytest.approx(expected, rel=1e-9)

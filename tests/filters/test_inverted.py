@@ -2,6 +2,7 @@
 is linear in the noise."""
 
 import numpy as np
+from numpy.testing import assert_allclose
 from scipy import stats
 
 from kfcourse import Model, run, simulate
@@ -19,13 +20,13 @@ def test_it_is_the_filter_of_the_transformed_measurement():
     sigma = np.sqrt(expected.cov[..., 0, 0])
     # twice the accuracy of a step
     assert (np.abs(law.mean - expected.mean)[..., 0] < 2e-6 * sigma).all()
-    np.testing.assert_allclose(law.cov, expected.cov, rtol=4e-6)
+    assert_allclose(law.cov, expected.cov, rtol=4e-6)
 
 
 def test_the_density_is_that_of_the_transformed_noise():
     model = Model.define("x + v", "exp(x + 0.5*w)", meter_noise={"mean": 0.2, "variance": 4})
     y, x = np.array([[0.3], [2.0], [-1.0], [np.nan]]), np.array([[0.1], [-0.4], [0.0], [0.0]])
     expected = stats.lognorm(s=1.0, scale=np.exp(x[:2, 0] + 0.1)).logpdf(y[:2, 0])
-    np.testing.assert_allclose(likelihood(model)(y, x)[:2], expected, rtol=1e-12)
+    assert_allclose(likelihood(model)(y, x)[:2], expected, rtol=1e-12)
     assert likelihood(model)(y, x)[2] == -np.inf  # no noise makes it negative
     assert likelihood(model)(y, x)[3] == 0

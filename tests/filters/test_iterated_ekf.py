@@ -3,15 +3,13 @@ sigma points."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from test_filters import Interpreter
 
+from kfcourse import Model, linearised, run, simulate, unscented
+from kfcourse.filters import iterated
 from kfcourse.filters import notation as s
-from kfcourse.filters.iterated_ekf import EQUATIONS, iterated
-from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.montecarlo.experiment import run
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import unscented
-from kfcourse.symbolic.structure import linearised
+from kfcourse.filters.iterated_ekf import EQUATIONS
 
 PRIOR_MEAN, PRIOR_COV = np.array([3.0, 1.0]), np.array([[0.9, 0.3], [0.3, 0.6]])
 NOISE = np.array([[0.04, 0.01], [0.01, 0.05]])
@@ -53,5 +51,5 @@ def test_the_printed_equations_are_the_filter(ranges, build):
         z, p = printed[Z_NEXT], printed[P_NEXT]
     law = run(iterated(structure, rounds), y)
     # the printed forms lose a few digits where the meter is sharper than the prior
-    np.testing.assert_allclose(law.mean[0], z[..., 0], rtol=1e-10)
-    np.testing.assert_allclose(law.cov[0], p, rtol=1e-9, atol=1e-12)
+    assert_allclose(law.mean[0], z[..., 0], rtol=1e-10)
+    assert_allclose(law.cov[0], p, rtol=1e-9, atol=1e-12)

@@ -15,6 +15,7 @@ from test_particles import histories
 
 from kfcourse import (
     Ensemble,
+    JumpModel,
     Model,
     ModelError,
     NotFinite,
@@ -26,14 +27,21 @@ from kfcourse import (
     simulate,
     unscented,
 )
-from kfcourse.filters import aof, kalman_filter, pointmass
-from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
-from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
-from kfcourse.lab.variants import find_variant
+from kfcourse.filters import (
+    aof,
+    gpb2,
+    imm,
+    kalman_filter,
+    logic_dynamic,
+    logic_dynamic_fbp,
+    logic_dynamic_fkp,
+    logic_dynamic_fos,
+    pointmass,
+)
+from kfcourse.lab import find_variant
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.montecarlo.experiment import walk
 from kfcourse.symbolic.averaging import averaged
-from kfcourse.symbolic.jumping import JumpModel
 
 pytestmark = pytest.mark.quick
 

@@ -7,8 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_normal
 
 from kfcourse import JumpModel, Model, linearised, run, simulate
-from kfcourse.filters import gpb2, logic_dynamic
-from kfcourse.filters.multiple_models import imm
+from kfcourse.filters import gpb2, imm, logic_dynamic
 from kfcourse.linear.system import linear_system
 from kfcourse.montecarlo.experiment import states
 

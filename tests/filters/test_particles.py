@@ -6,6 +6,7 @@ from itertools import pairwise, product
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_array_less
 from scipy import stats
 from scipy.special import logsumexp
 from test_multiple_models import matrices
@@ -88,7 +89,7 @@ def agree(sample, expected, unit):
     few 1/PARTICLES; "few" is the particles over the effective ones, below 10 here.
     """
     error, standard = sample.mean(axis=2) - expected, sample.std(axis=2, ddof=1) / np.sqrt(REPLICAS)
-    np.testing.assert_array_less(np.abs(error), 5 * standard + 10 / PARTICLES * unit)
+    assert_array_less(np.abs(error), 5 * standard + 10 / PARTICLES * unit)
 
 
 # --- against what is exact

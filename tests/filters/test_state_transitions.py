@@ -3,12 +3,12 @@ refused."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from test_jumps import SENSOR, failing, of
 
-from kfcourse import JumpModel, ModelError, linearised, run, simulate
+from kfcourse import Gaussian, JumpModel, ModelError, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
-from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.experiment import states
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
@@ -35,7 +35,7 @@ def test_a_constant_formula_is_the_constant_matrix_bit_for_bit(build):
     drawn = [simulate(model, 20, 10, seed=1) for model in (numbers, formulas)]
     laws = [run(of(build, model), drawn[0].y) for model in (numbers, formulas)]
     for left, right in (*zip(*drawn, strict=True), *zip(*laws, strict=True)):
-        np.testing.assert_array_equal(left, right)
+        assert_array_equal(left, right)
 
 
 def test_trajectories_follow_the_state():
@@ -127,9 +127,7 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
             variance = density.sum(axis=0) @ (x - z) ** 2
             assert abs(state.posterior.mean[trajectory, 0] - z) < 2e-3 * np.sqrt(variance), k
             assert abs(state.posterior.cov[trajectory, 0, 0] / variance - 1) < 4e-3, k
-            np.testing.assert_allclose(
-                state.memory.probability[trajectory], density.sum(axis=1), atol=2e-3
-            )
+            assert_allclose(state.memory.probability[trajectory], density.sum(axis=1), atol=2e-3)
             faulty = (to_faulty * density).sum(axis=0)
             grids[trajectory] = np.stack([kernel @ (density.sum(axis=0) - faulty), kernel @ faulty])
     assert (state.memory.discretisation_error() < 1e-2).all()

@@ -9,25 +9,24 @@ import pytest
 from numpy.testing import assert_allclose
 from test_every_filter import LINEAR
 
-from kfcourse.filters import (
-    alpha_beta,
-    aof,
-    duof,
-    kalman_filter,
-    pointmass,
+from kfcourse import (
+    FormulaError,
+    Model,
+    ModelError,
+    NoClosedForm,
+    design,
+    gauss_hermite,
+    gaussian,
+    linearised,
+    run,
+    simulate,
+    unscented,
 )
+from kfcourse.filters import alpha_beta, aof, duof, kalman_filter, pointmass
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Instant, simulate
-from kfcourse.montecarlo.experiment import run
+from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.scenarios.navigation import Sensor
 from kfcourse.symbolic.equations import compile_model, compile_noiseless
-from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.quadrature import gauss_hermite, unscented
-from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
 

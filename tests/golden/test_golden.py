@@ -15,18 +15,25 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.filters import EQUATIONS, aof, latex, pointmass
-from kfcourse.filters.designed import Design
-from kfcourse.lab import FILTERS, LAB, find_variant, lab_filters, load_variants
-from kfcourse.lab.short_names import JUMP_FILTERS, Structures
-from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Instant, simulate
-from kfcourse.montecarlo.experiment import compare, run
-from kfcourse.records import likelihood, smooth
-from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import gaussian, linearised
+from kfcourse import (
+    JumpModel,
+    ModelError,
+    NoClosedForm,
+    compare,
+    design,
+    gaussian,
+    lab_filters,
+    likelihood,
+    linearised,
+    load_variants,
+    run,
+    simulate,
+    smooth,
+)
+from kfcourse.filters import EQUATIONS, Design, aof, latex, pointmass
+from kfcourse.lab import FILTERS, LAB, Structures, find_variant
+from kfcourse.lab.short_names import JUMP_FILTERS
+from kfcourse.montecarlo.ensemble import Instant
 
 PATH = Path(__file__).with_name("golden.json")
 STEPS, RUNS = 6, 3
@@ -177,7 +184,7 @@ def exact(name):
 def comparison(name):
     """Error variances of the lab's filters, and their standard errors."""
     model = PLAIN[name]
-    result = compare(lab_filters(model), model, 20_000, 10, seed=1, progress=False)
+    result = compare(lab_filters(model), model, 20_000, 10, seed=1)
     variances = {short: result.error_variance(short) for short in LAB}
     return {short: np.array([each.value, each.standard_error]) for short, each in variances.items()}
 

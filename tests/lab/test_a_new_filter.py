@@ -9,12 +9,10 @@ import dataclasses
 import pytest
 import sympy as sp
 
-from kfcourse import filters
+from kfcourse import Gaussian, filters
+from kfcourse.filters import Filter, State, aof
 from kfcourse.filters import notation as s
-from kfcourse.filters.approximations import aof
-from kfcourse.filters.base import Filter, State
 from kfcourse.lab import families, plots, short_names
-from kfcourse.laws import Gaussian
 
 FACTOR = sp.Symbol("varphi", positive=True)
 EQUATIONS = (*filters.EQUATIONS["aof"][:-1], sp.Eq(s.Psi_next, FACTOR * s.Theta_zp))  # step 1

@@ -2,9 +2,9 @@
 
 import pytest
 
+from kfcourse import Model
+from kfcourse.lab import FILTERS
 from kfcourse.lab.admission import admissions, table
-from kfcourse.lab.short_names import FILTERS
-from kfcourse.symbolic.model import Model
 
 pytestmark = pytest.mark.quick
 

@@ -6,23 +6,15 @@ import re
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
+from kfcourse import JumpModel, Model, NoClosedForm, gauss_hermite, lab_filters, simulate
 from kfcourse.filters import aof, logic_dynamic
+from kfcourse.lab import Structures, find_variant, title
 from kfcourse.lab import checked_quadrature as cq
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import (
-    Structures,
-    lab_filters,
-    title,
-)
-from kfcourse.lab.variants import find_variant
-from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import states
 from kfcourse.scenarios import benchmarks
-from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.quadrature import gauss_hermite
 
 CUBIC = Model.define("x/(1 + x**2) + v", "x**3 + x + w", prior={"mean": 0.1, "variance": 1})
 
@@ -99,9 +91,7 @@ def test_a_mode_with_formulas_keeps_them_beside_one_without():
     plain, by_points = checked(model).structures
     assert plain.formulas is not None and by_points.formulas is None
     tau, theta = plain.predict(np.full((3, 1), 2.0), np.full((3, 1, 1), 0.5))
-    np.testing.assert_allclose(
-        (tau[:, 0], theta[:, 0, 0]), (np.full(3, 1.8), np.full(3, 1.405)), rtol=1e-15
-    )
+    assert_allclose((tau[:, 0], theta[:, 0, 0]), (np.full(3, 1.8), np.full(3, 1.405)), rtol=1e-15)
 
 
 def test_modes_for_which_no_order_does_leave_the_others_linearised_and_say_so():

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from numpy.testing import assert_allclose, assert_array_equal
 
-from kfcourse import Model, linearised, run, smooth
+from kfcourse import Model, linearised, read_measurements, run, smooth
 from kfcourse.filters import aof, gated
 from kfcourse.lab import own_data
 from kfcourse.lab.own_data import estimate_record, model_of
 from kfcourse.records import estimate
-from kfcourse.records.reading import read_measurements
 
 MODELS = """
 [variants.plane]
@@ -105,8 +105,8 @@ def test_the_practitioner_s_track(place):
     # and it is what the package's filters give for the model typed in Python
     record = read_measurements(place / "track.csv", variant.model)
     filter_ = gated(aof(linearised(record.model)), 0.999)
-    np.testing.assert_array_equal(behind.estimate.mean, run(filter_, record.y).mean)
-    np.testing.assert_array_equal(behind.smoothed.mean, smooth(filter_, record.y).mean)
+    assert_array_equal(behind.estimate.mean, run(filter_, record.y).mean)
+    assert_array_equal(behind.smoothed.mean, smooth(filter_, record.y).mean)
 
 
 def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
@@ -148,7 +148,7 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         ("log_likelihood", analysis.examined.log_likelihood[:, 0]),
     ):
         # the file of measurements has six decimals
-        np.testing.assert_allclose(table[name], column, rtol=1e-6, atol=1e-6)
+        assert_allclose(table[name], column, rtol=1e-6, atol=1e-6)
     html = (place / "out" / "report.html").read_text(encoding="utf-8")
     images = re.findall(r'<img src="([^"]+)" alt="([^"]+)"', html)
     assert len(images) == 1 + 4 + 2 * 2 and all(
@@ -170,8 +170,8 @@ def test_times_keep_all_their_digits_and_a_gate_may_judge_components(no_figures,
     arguments = "stamps.csv --model my.toml --variant plane --gate 0.999 --out out"
     assert "refused 1 of 6 measurements: rows 4" in call(arguments, "--by-component").output
     table = numbers(place / "out" / "estimate.csv")
-    np.testing.assert_array_equal(table["time"], stamps)
-    np.testing.assert_array_equal(table["weight"], [1, 1, 1, 0.5, 1, 1])
+    assert_array_equal(table["time"], stamps)
+    assert_array_equal(table["weight"], [1, 1, 1, 0.5, 1, 1])
     (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows[:2], rows[0]]))
     assert "1484649904.25 comes after 1484649904.75" in call(arguments).output
 
@@ -220,9 +220,7 @@ def test_every_filter_of_the_option(place, structure):
     )
     expected = estimate_record(place / "line.csv", model_of(place / "my.toml", "line"))
     # a linear model
-    np.testing.assert_allclose(
-        analysis.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9
-    )
+    assert_allclose(analysis.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9)
     assert analysis.record.model == Model.define(
         "x + dt*v", "x + w", inputs={"dt": [0.5, 1.5, 0.5, 0.5, 0.5]}
     )

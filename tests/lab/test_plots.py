@@ -7,11 +7,11 @@ import pytest
 from colours import apart, contrast, shown
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import compare, lab_filters, load_variants
-from kfcourse.lab import plots
+from kfcourse.lab import FILTERS, LAB, plots, title
 from kfcourse.lab.families import FAMILIES, look
-from kfcourse.lab.short_names import FILTERS, LAB, title
 
 pytestmark = pytest.mark.quick
 
@@ -26,7 +26,7 @@ DRAW = [plots.accuracy, plots.relative_accuracy, plots.ranking, plots.consistenc
 
 def comparison(name, names, runs=200):
     model = load_variants()[name].model
-    return compare(lab_filters(model, names), model, runs, 7, 1, progress=False)
+    return compare(lab_filters(model, names), model, runs, 7, 1)
 
 
 @pytest.fixture(scope="module")
@@ -96,12 +96,12 @@ def test_the_bands_are_confidence_intervals(results):
     ax = plots.relative_accuracy(result, Figure().add_subplot())
     for i, name in enumerate(name for name in result.entrants if name != result.reference):
         low, high = result.gap(name).interval()
-        np.testing.assert_allclose(band(ax, i), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
+        assert_allclose(band(ax, i), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
     assert len(ax.collections) == len(result.entrants) - 1  # the control is the axis
     ax = plots.consistency(result, Figure().add_subplot())
     for i, name in enumerate(result.entrants):
         interval = result.normalised_error(name).interval()
-        np.testing.assert_allclose(band(ax, i), interval, rtol=1e-12)
+        assert_allclose(band(ax, i), interval, rtol=1e-12)
 
 
 def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
@@ -109,7 +109,7 @@ def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
     plots.ranking(result, ax)
     for bars, (_, score) in zip(ax.containers, result.ranking()[::-1], strict=True):
         (segment,) = bars.lines[2][0].get_segments()
-        np.testing.assert_allclose(
+        assert_allclose(
             segment[:, 0], [100 * limit for limit in score.interval(0.95)], rtol=1e-9, atol=1e-12
         )
 
@@ -118,7 +118,7 @@ def test_the_lines_are_the_numbers(results, ax):
     result = results["vector"]
     plots.accuracy(result, ax)
     for line, name in zip(ax.lines, result.names, strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), result.error_variance(name).value)
+        assert_array_equal(line.get_ydata(), result.error_variance(name).value)
     assert ax.get_yscale() == "log"
 
 

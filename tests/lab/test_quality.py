@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from weekly import weekly
 
-from kfcourse import Model, load_variants
+from kfcourse import Comparison, Model, load_variants
 from kfcourse.exercises.checks.posing import unposed
-from kfcourse.lab import grammar, quality
+from kfcourse.lab import Structures, grammar, quality, read_variant
 from kfcourse.lab.grammar import PIECES, generate, propose
 from kfcourse.lab.quality import (
     Finding,
@@ -25,11 +25,9 @@ from kfcourse.lab.quality import (
     solvable,
     table,
 )
-from kfcourse.lab.short_names import Structures
-from kfcourse.lab.variants import STEPS, read_variant
+from kfcourse.lab.variants import STEPS
 from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo import BATCHES, FEWEST
-from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.statistics import Sums
 
 SHIPPED = load_variants()

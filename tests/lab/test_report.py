@@ -13,10 +13,21 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from numpy.testing import assert_allclose
 
-from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants, run, simulate
+from kfcourse import (
+    Model,
+    NotFinite,
+    compare,
+    gaussian,
+    lab_filters,
+    linearised,
+    load_variants,
+    run,
+    simulate,
+)
 from kfcourse.filters import aof
-from kfcourse.lab import Variant, report_text
+from kfcourse.lab import LAB, Variant, report_text, title
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.plots import FIGURES
 from kfcourse.lab.report import (
@@ -29,17 +40,16 @@ from kfcourse.lab.report import (
 )
 from kfcourse.lab.report_sections import StudentReport
 from kfcourse.lab.report_text import cause, filled, inline_tex, scalar_equations
-from kfcourse.lab.short_names import LAB, title
 from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.comparison import Verdict
-from kfcourse.montecarlo.designing import NotFinite, failed
+from kfcourse.montecarlo.designing import failed
 from kfcourse.montecarlo.statistics import Estimate
 
 VARIANTS = load_variants()
 
 
 def compared(model, names=LAB, runs=300, steps=4, **options):
-    return compare(lab_filters(model, names), model, runs, steps, 1, progress=False, **options)
+    return compare(lab_filters(model, names), model, runs, steps, 1, **options)
 
 
 def page_of(folder, name="report.html"):
@@ -106,7 +116,7 @@ def test_a_difference_is_significant_if_its_interval_excludes_zero(results):
         printed = [
             float(number) for number in re.findall(r"confidence: (\S+) to (\S+) %", sentence)[0]
         ]
-        np.testing.assert_allclose(printed, [100 * low, 100 * high], rtol=0.005)  # three digits
+        assert_allclose(printed, [100 * low, 100 * high], rtol=0.005)  # three digits
         assert "95 % confidence" in sentence
 
 
@@ -437,7 +447,7 @@ def test_a_filter_that_diverges_and_other_reasons():
     model = VARIANTS["53"].model
     with pytest.raises(NotFinite) as caught:
         cubic = Model.define("2*x + x**3 + v", "x + w")
-        compare(lab_filters(cubic, ["aof-linearised"]), cubic, 50, 40, 1, progress=False)
+        compare(lab_filters(cubic, ["aof-linearised"]), cubic, 50, 40, 1)
     # not the filter's fault: quoted
     assert "trajectories" in cause(str(caught.value), model, WORDS["ru"])
     negative = failed(
@@ -463,9 +473,7 @@ def test_one_filter_left(no_figures, tmp_path):
     model = Model.define("0.9*x + v", "x + (1 if x > 0 else 0) + sin(w)")
     result_ = admissions(model, LAB)
     reasons = {each.name: each.reason for each in result_ if each.built is None}
-    result = compare(
-        [each.built for each in result_ if each.built], model, 200, 3, 1, progress=False
-    )
+    result = compare([each.built for each in result_ if each.built], model, 200, 3, 1)
     result = dataclasses.replace(result, left_out=reasons)
     paths = write_report(Variant("one_left", "", model), result, tmp_path, "ru")
     tex = page_of(tmp_path, "report.tex")

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 import scipy
 import sympy as sp
+from numpy.testing import assert_array_equal
 
-from kfcourse import compare, gaussian, lab_filters, linearised
+from kfcourse import NoClosedForm, compare, gaussian, lab_filters, linearised
 from kfcourse.continuous import moment_equations
-from kfcourse.errors import NoClosedForm
+from kfcourse.lab import LAB, Structures, find_variant, read_variant
 from kfcourse.lab.quality import solvable
 from kfcourse.lab.report import write_json, write_report
 from kfcourse.lab.report_text import written_lines
-from kfcourse.lab.short_names import LAB, Structures, judging
-from kfcourse.lab.variants import find_variant, read_variant
+from kfcourse.lab.short_names import judging
 
 pytestmark = pytest.mark.usefixtures("no_figures")
 
@@ -36,7 +36,7 @@ WALK = {
 @pytest.fixture(scope="module")
 def compared():
     """CD1 with scores, and a walk in two dimensions at listed instants, in Stratonovich's sense."""
-    results, options = {}, {"design_runs": 300, "progress": False}
+    results, options = {}, {"design_runs": 300}
     for variant, names in (
         (find_variant("CD1"), [*LAB, "aof-exact"]),
         (read_variant("walk", WALK, "here"), ["aof-gaussian", "duof", "fos-linearised"]),
@@ -161,7 +161,7 @@ def test_scores_stand_in_the_numbers(compared, tmp_path):
         for name in result.names:
             estimate = getattr(result, kind)(name)
             printed = np.array(numbers[kind][name], dtype=float)  # null is NaN
-            np.testing.assert_array_equal(printed, estimate.value)
+            assert_array_equal(printed, estimate.value)
             errors = np.array(numbers[f"{kind}_standard_error"][name], dtype=float)
-            np.testing.assert_array_equal(errors, estimate.standard_error)
+            assert_array_equal(errors, estimate.standard_error)
     assert None not in numbers["crps"]["aof-exact"]

@@ -7,6 +7,7 @@ import numpy as np
 import oracles
 import pytest
 import sympy as sp
+from numpy.testing import assert_allclose
 
 from kfcourse import JumpModel, compare, gaussian, linearised, simulate
 from kfcourse.filters import jump_equations, latex, logic_dynamic
@@ -67,8 +68,8 @@ def test_the_printed_equations_are_the_logic_dynamic_filter():
             [*jump_equations.combination(1, 2)[:2], *jump_equations.combination(2, 2)[1:]], values
         )
         state = filter_.step(state, y[k])
-        np.testing.assert_allclose(values[s.z][:, 0], state.posterior.mean[0], rtol=1e-10)
-        np.testing.assert_allclose(values[s.P], state.posterior.cov[0], rtol=1e-9, atol=1e-12)
+        assert_allclose(values[s.z][:, 0], state.posterior.mean[0], rtol=1e-10)
+        assert_allclose(values[s.P], state.posterior.cov[0], rtol=1e-9, atol=1e-12)
         for j, structure in enumerate(structures, 1):
             for i in (1, 2):
                 tau, Theta = jump_equations.ahead(j, i)
@@ -86,7 +87,7 @@ def compared():
     names += ["aof-averaged", "aof-exact"]
     model = find_variant("J1-lasting").model
     filters = [each.built for each in admissions(model, names)]
-    result = compare(filters, model, 128, 3, 1, progress=False, jobs=1)
+    result = compare(filters, model, 128, 3, 1, jobs=1)
     return result, recognised_modes(result, filters)
 
 
@@ -138,7 +139,7 @@ def test_modes_with_other_equations_are_told_one_by_one(no_figures, tmp_path):
         logic_dynamic([kind(mode) for mode in model.modes], model, model.first)
         for kind in (gaussian, linearised)
     ]
-    result = compare(both, model, 400, 3, 1, progress=False, jobs=1)
+    result = compare(both, model, 400, 3, 1, jobs=1)
     write_report(Variant("own", "", model), result, tmp_path, "en")
     tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
     # the task, and two kinds of structural functions

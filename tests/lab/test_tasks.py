@@ -3,16 +3,11 @@ structural functions and filters of D1, D2 and J4 are those of tests/golden."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
-from kfcourse import (
-    JumpModel,
-    Model,
-    gaussian,
-    linearised,
-    load_variants,
-    simulate,
-)
-from kfcourse.lab.variants import VariantError, find_variant, read_variant, read_variants
+from kfcourse import JumpModel, Model, gaussian, linearised, load_variants, simulate
+from kfcourse.lab import VariantError, find_variant, read_variant
+from kfcourse.lab.variants import read_variants
 
 pytestmark = pytest.mark.quick
 
@@ -55,12 +50,12 @@ def test_the_moments_of_their_meters_are_those_of_the_note():
         z, p = m + 2, d + 0.5
         h, G, F, _ = gaussian(BETWEEN[name].model).at(0).measure(np.array([z]), np.array([[p]]))
         wanted = [z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + noise]
-        np.testing.assert_allclose([np.squeeze(each) for each in (h, G, F)], wanted, rtol=1e-12)
+        assert_allclose([np.squeeze(each) for each in (h, G, F)], wanted, rtol=1e-12)
     for name, noise in (("CD2", 1), ("C2", 10)):
         z, p = law(BETWEEN[name].model, 2)
         _, G, F, _ = gaussian(BETWEEN[name].model).at(0).measure(z, p)
-        np.testing.assert_allclose(F - p, noise * np.eye(2), atol=1e-12)
-        np.testing.assert_array_equal(G, np.eye(2))  # in the source diag(1, 0)
+        assert_allclose(F - p, noise * np.eye(2), atol=1e-12)
+        assert_array_equal(G, np.eye(2))  # in the source diag(1, 0)
 
 
 def test_one_second_of_the_landing_is_a_step_of_d3_but_for_euler_s_error():
@@ -68,7 +63,7 @@ def test_one_second_of_the_landing_is_a_step_of_d3_but_for_euler_s_error():
     step = linearised(TASKS["D3"].model)
     for k in (5, 30):
         euler = step.at(k).predict(x[k], np.zeros((3, 3))).mean
-        np.testing.assert_allclose(x[k + 1], euler, atol=0.02)
+        assert_allclose(x[k + 1], euler, atol=0.02)
         assert np.abs(x[k + 1] - euler).max() > 1e-4
 
 
@@ -105,11 +100,11 @@ def test_the_meter_of_the_landing_has_the_jacobian_of_the_note(
             of_lift = E * sign * np.array([-np.sin(theta), np.cos(theta)])
             columns += [E * rho / density, of_lift, -E * turned]
         wanted = gamma * np.column_stack(columns)
-        np.testing.assert_allclose(h, gamma * E * rho, rtol=1e-9)
-        np.testing.assert_allclose(G, wanted, rtol=1e-9, atol=1e-18)
+        assert_allclose(h, gamma * E * rho, rtol=1e-9)
+        assert_allclose(G, wanted, rtol=1e-9, atol=1e-18)
         noise = np.diag(E**2 * rho**2 * multiplied + added)
-        np.testing.assert_allclose(R, gamma**2 * noise, rtol=1e-9, atol=1e-30)
-        np.testing.assert_allclose(F, G @ d @ G.T + R, rtol=1e-9)
+        assert_allclose(R, gamma**2 * noise, rtol=1e-9, atol=1e-30)
+        assert_allclose(F, G @ d @ G.T + R, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["D3", "J3", "J4"])
@@ -125,7 +120,7 @@ def test_the_lift_is_switched_at_45_s(name):
     turned = np.diff(angle, axis=0) - (np.cos(angle) * (speed / (3400 + height) - g0 / speed))[:-1]
     push = (density * lift * speed * np.exp(-0.09 * height))[:-1]
     signs = np.sign(np.arange(59) - 45.0)
-    np.testing.assert_allclose(turned, signs[:, None] * push, rtol=1e-6, atol=1e-12)
+    assert_allclose(turned, signs[:, None] * push, rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("steps", [0, 2.5, "many"])

@@ -6,19 +6,12 @@ import tomllib
 import pytest
 
 from kfcourse import Model, ModelError, NoClosedForm, gaussian, lab_filters, load_variants
-from kfcourse.exercises.checks import exercise
-from kfcourse.exercises.checks.exercises import ExerciseError
+from kfcourse.exercises.checks import ExerciseError, exercise
 from kfcourse.exercises.checks.posing import unposed
 from kfcourse.filters import Design, Filter
+from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, title
 from kfcourse.lab import variants as of_variants
-from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
-from kfcourse.lab.variants import (
-    VariantError,
-    VariantWarning,
-    chosen_variants,
-    find_variant,
-    read_variants,
-)
+from kfcourse.lab.variants import VariantWarning, chosen_variants, read_variants
 
 pytestmark = pytest.mark.quick
 

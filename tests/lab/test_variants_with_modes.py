@@ -10,20 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from kfcourse import JumpModel, NotFinite, compare, load_variants, simulate
 from kfcourse.exercises.notebooks import handing_out
 from kfcourse.exercises.notebooks.jobs import Outcome
 from kfcourse.filters import imm, logic_dynamic, particle, pointmass
+from kfcourse.lab import Structures, VariantError, find_variant, title
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import JUMP_LAB, Structures, judging, title
-from kfcourse.lab.variants import (
-    VariantError,
-    chosen_variants,
-    find_variant,
-    read_variants,
-    summary,
-)
+from kfcourse.lab.short_names import JUMP_LAB, judging
+from kfcourse.lab.variants import chosen_variants, read_variants, summary
 from kfcourse.montecarlo.modes import recognised
 
 JUMPS = {
@@ -201,7 +197,7 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
     assert outcome.share[filter_.name].value == pytest.approx(np.mean(right), abs=1e-12)
     assert outcome.guess == pytest.approx((mode == 0).mean(), abs=1e-12)
     shown = next(k for k in range(20) if 0 < mode[:, k].mean() < 1)  # the first with both modes
-    np.testing.assert_array_equal(outcome.mode, mode[:, shown])
+    assert_array_equal(outcome.mode, mode[:, shown])
     assert outcome.probability[filter_.name].shape == (8, 2)
     # particles are slow
     assert [filter_.freedom + 1 for filter_ in outcome.share.values()] == [160, 160, 20]
@@ -219,7 +215,7 @@ def test_the_lab_takes_every_variant_that_is_shipped(name, command, tmp_path):
 def test_predictions_are_judged_where_transitions_depend_on_the_state():
     model = JUMPS["J1-overload"].model
     filter_ = imm(Structures(model).gaussian, model)
-    result = compare([filter_], model, 20, 3, 1, scores=judging(model), progress=False)
+    result = compare([filter_], model, 20, 3, 1, scores=judging(model))
     assert np.isfinite(result.log_score(filter_.name).value).all()
 
 

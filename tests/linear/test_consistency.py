@@ -7,8 +7,9 @@ import scipy.linalg
 import scipy.stats
 from numpy.testing import assert_allclose
 
-from kfcourse.filters.kalman import kalman_filter
-from kfcourse.laws import Gaussian, normalised_square
+from kfcourse import Gaussian, Model, linearised, predictions, simulate
+from kfcourse.filters import kalman_filter
+from kfcourse.laws import normalised_square
 from kfcourse.linear.consistency import (
     Innovations,
     alarms,
@@ -20,10 +21,6 @@ from kfcourse.linear.consistency import (
     nis,
 )
 from kfcourse.linear.system import linear_system
-from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.montecarlo.experiment import predictions
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import linearised
 
 pytestmark = pytest.mark.quick
 

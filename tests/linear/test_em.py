@@ -4,7 +4,7 @@ import numpy as np
 import oracles
 import pytest
 
-from kfcourse.laws import Gaussian
+from kfcourse import Gaussian
 from kfcourse.linear import LinearSystem, em_rounds, simulate
 
 pytestmark = pytest.mark.quick

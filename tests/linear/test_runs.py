@@ -7,7 +7,7 @@ import oracles
 import pytest
 from numpy.testing import assert_allclose
 
-from kfcourse.laws import Gaussian
+from kfcourse import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.linear.arithmetic import FORMS
 

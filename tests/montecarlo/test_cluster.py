@@ -3,13 +3,13 @@
 import os
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from distributed import LocalCluster
+from numpy.testing import assert_allclose
 
-from kfcourse import compare, gaussian
+from kfcourse import compare, gaussian, lab_filters
 from kfcourse.filters import aof, pointmass
-from kfcourse.lab.short_names import LAB, lab_filters
+from kfcourse.lab import LAB
 from kfcourse.montecarlo.parallel import cluster
 
 
@@ -37,15 +37,11 @@ def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, vari
         os._exit(1)
 
     filters = [*lab_filters(variant53, LAB[1:]), pointmass(variant53)]
-    here = compare([gaof, *filters], variant53, 200, 3, 1, jobs=1, progress=False)
-    there = compare(
-        [replace(gaof, step=step), *filters], variant53, 200, 3, 1, dask=address, progress=False
-    )
+    here = compare([gaof, *filters], variant53, 200, 3, 1, jobs=1)
+    there = compare([replace(gaof, step=step), *filters], variant53, 200, 3, 1, dask=address)
     assert lost.exists()
     for name, sums, others in zip(here.sums._fields, here.sums, there.sums, strict=True):
-        np.testing.assert_allclose(
-            others, sums, rtol=1e-8 if name == "doubt" else 1e-12, err_msg=name
-        )
+        assert_allclose(others, sums, rtol=1e-8 if name == "doubt" else 1e-12, err_msg=name)
 
 
 @pytest.mark.parametrize("wrong", ["nonsense", "nobody.invalid:8786", "tcp://127.0.0.1:1"])

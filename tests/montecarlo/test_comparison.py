@@ -7,22 +7,15 @@ from dataclasses import replace
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
-from kfcourse.filters.approximations import aof
-from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.exact.pointmasses import pointmass
-from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.optimal_structure import fos, mfos
-from kfcourse.filters.particles import particle
-from kfcourse.laws import Gaussian
+from kfcourse import Comparison, Ensemble, Gaussian, Model, compare, gaussian, linearised, run
+from kfcourse.filters import aof, duof, fos, kalman_filter, mfos, particle, pointmass
 from kfcourse.montecarlo import BATCHES
-from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.ensemble import Ensemble, side_by_side, stratified, weights
-from kfcourse.montecarlo.experiment import batch_sizes, compare, run
+from kfcourse.montecarlo.ensemble import side_by_side, stratified, weights
+from kfcourse.montecarlo.experiment import batch_sizes
 from kfcourse.montecarlo.statistics import Estimate, Sums, claimed, rejected
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import gaussian, linearised
 
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
 # relative error of a standard error from so many batches
@@ -58,7 +51,7 @@ def direct(linear):
     single = Gaussian(np.zeros(2), np.eye(2))
     wrong = replace(linear, prior=Gaussian(np.zeros(2), 9 * np.eye(2)), meter_noise=single)
     filters = [aof(gaussian(linear)), duof(linear), replace(kalman_filter(wrong), name="wrong")]
-    result = compare(filters, linear, RUNS, STEPS, SEED, same_ensemble=True, progress=False)
+    result = compare(filters, linear, RUNS, STEPS, SEED, same_ensemble=True)
     x, y = stored(linear, RUNS, STEPS, SEED)
     laws = {single.name: run(single, y) for single in (filters[0], filters[2])}
     return result, {name: (x - estimate.mean, estimate.cov) for name, estimate in laws.items()}
@@ -80,8 +73,8 @@ def jackknife(function, *values):
 
 def agree(estimate, function, *values):
     value, error = jackknife(function, *values)
-    np.testing.assert_allclose(estimate.value, value, rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(estimate.standard_error, error, rtol=1e-8, atol=1e-13)
+    assert_allclose(estimate.value, value, rtol=1e-11, atol=1e-13)
+    assert_allclose(estimate.standard_error, error, rtol=1e-8, atol=1e-13)
 
 
 def of_mean(estimate, values):
@@ -100,7 +93,7 @@ def test_the_statistics_are_those_of_the_trajectories(direct):
         of_mean(result.component_variance(name), np.moveaxis(error**2, 1, -1))
         normalised = np.einsum("kni,knij,knj->kn", error, np.linalg.inv(cov), error) / 2
         of_mean(result.normalised_error(name), normalised)
-        np.testing.assert_allclose(
+        assert_allclose(
             result.own_variance(name).value,
             np.trace(cov, axis1=-2, axis2=-1).mean(axis=-1),
             rtol=1e-11,
@@ -147,8 +140,8 @@ def test_intervals_are_student_s(direct):
     estimate = direct[0].error_variance("duof")
     low, high = estimate.interval(0.9)
     half = stats.t.ppf(0.95, BATCHES - 1) * estimate.standard_error
-    np.testing.assert_allclose(high - estimate.value, half, rtol=1e-9)
-    np.testing.assert_allclose(estimate.value - low, half, rtol=1e-9)
+    assert_allclose(high - estimate.value, half, rtol=1e-9)
+    assert_allclose(estimate.value - low, half, rtol=1e-9)
     with pytest.raises(ValueError, match="confidence"):
         estimate.interval(95)
 
@@ -162,9 +155,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     hits = 0
     for seed in range(200):
         low, high = (
-            compare([single], linear, 400, 1, seed, jobs=1, progress=False)
-            .error_variance("kalman")
-            .interval(0.95)
+            compare([single], linear, 400, 1, seed, jobs=1).error_variance("kalman").interval(0.95)
         )
         hits += bool(low[0] < truth < high[0])
     assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
@@ -178,9 +169,7 @@ def test_every_half_of_the_initial_states_has_one_in_each_stratum(size):
     standard = stratified(np.random.default_rng(1), size, 2, 3.0)
     for half, scale in ((standard[::2], 1.0), (standard[1::2], 3.0)):
         strata = np.floor(len(half) * stats.norm.cdf(half / scale)).astype(int)
-        np.testing.assert_array_equal(
-            np.sort(strata, axis=0), np.tile(np.arange(len(half))[:, None], (1, 2))
-        )
+        assert_array_equal(np.sort(strata, axis=0), np.tile(np.arange(len(half))[:, None], (1, 2)))
 
 
 def test_weights_make_up_for_the_wider_law():
@@ -269,7 +258,7 @@ def test_all_follows_from_the_bound_and_the_distances_from_it(bounded):
         1 / 4, rel=1e-14
     )
     distances = np.array([1.0, 2, 1, 2])
-    np.testing.assert_allclose(
+    assert_allclose(
         bounded.difference("other", "aof-exact").standard_error,
         distances.std(ddof=1) / 2,
         rtol=1e-13,
@@ -324,7 +313,7 @@ def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
 
 def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
     filters = [aof(gaussian(variant53)), aof(linearised(variant53)), pointmass(variant53)]
-    result = compare(filters, variant53, 300, 3, seed=2, progress=False)
+    result = compare(filters, variant53, 300, 3, seed=2)
     direct = [result.component_variance(name).value[:, 0] for name in result.names]
     above = Estimate.jackknife(result.sums.means("square")[0, :, 0] - result.sums.means("own")[2])
     gap = result.difference("aof-gaussian", "aof-exact")
@@ -337,7 +326,7 @@ def test_the_particles_own_error_is_not_in_the_bound(linear):
     """The Kalman filter is exact: what distances tell is the particles' error, of which a product
     of both halves holds little."""
     exact = replace(particle(linear, 50), name="aof-exact")
-    result = compare([kalman_filter(linear), exact], linear, 12_800, 1, seed=1, progress=False)
+    result = compare([kalman_filter(linear), exact], linear, 12_800, 1, seed=1)
     excess = result.difference("kalman", "aof-exact")
     doubt = result.sums.means("doubt")[:, 0]
     # The clouds of each batch draw the same numbers: 200 independent products, of errors whose mean
@@ -356,7 +345,7 @@ def test_a_slow_filter_that_fails_is_left_out(variant53):
         return exact.step(state, y)
 
     slow = replace(exact, slow=True, step=fails)
-    result = compare([aof(gaussian(variant53)), slow], variant53, 100, 3, seed=1, progress=False)
+    result = compare([aof(gaussian(variant53)), slow], variant53, 100, 3, seed=1)
     assert result.names == ("aof-gaussian",)
     assert str(result.left_out["aof-exact"]) == "step 1: aof-exact failed: it cannot"
 
@@ -400,9 +389,7 @@ def test_filters_that_coincide_keep_their_order_and_nobody_is_better(variant53):
 
 def test_where_all_errors_are_zero_filters_are_equal(variant53):
     known = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0})
-    result = compare(
-        [aof(gaussian(known)), aof(linearised(known))], known, 200, 3, seed=1, progress=False
-    )
+    result = compare([aof(gaussian(known)), aof(linearised(known))], known, 200, 3, seed=1)
     assert not result.error_variance("aof-linearised").value.any()
     assert result.without_error.all() and not result.usable.any()
     assert np.isnan(result.relative("aof-linearised").value).all()  # of nothing, nothing is a part
@@ -445,8 +432,7 @@ def repeated(variant53):
         *(family(structure) for family in (fos, mfos) for structure in structures),
     ]
     results = (
-        compare(filters, variant53, 125_000, 11, seed, same_ensemble=True, progress=False)
-        for seed in range(8)
+        compare(filters, variant53, 125_000, 11, seed, same_ensemble=True) for seed in range(8)
     )
     return np.array([[each.error_variance(name).value for name in COLUMNS] for each in results])
 
@@ -476,7 +462,7 @@ def test_the_table_of_the_page_is_reproduced(repeated, k):
 def test_a_printed_comparison_says_what_to_ask(variant53):
     outcome = compare(
         [aof(gaussian(variant53)), pointmass(variant53)], variant53, 100, 2, 7,
-        smoothers=[aof(gaussian(variant53))], progress=False,
+        smoothers=[aof(gaussian(variant53))],
     )  # fmt: skip
     heading, asked = str(outcome).splitlines()
     assert heading == "Comparison of aof-gaussian, aof-exact: 2 steps, 100 trajectories, seed 7"
@@ -493,15 +479,15 @@ BOTH = [aof(gaussian(BENT)), aof(linearised(BENT))]
 def test_without_a_standard_error_nothing_is_significant():
     """Of one trajectory, or of a zero that is certain."""
     certain = Estimate(np.array([1.0, 0.0]), np.zeros(2), 5)
-    np.testing.assert_array_equal(certain.p_value(), [0.0, 1.0])
-    alone = compare(BOTH, BENT, 1, 3, seed=1, progress=False)
+    assert_array_equal(certain.p_value(), [0.0, 1.0])
+    alone = compare(BOTH, BENT, 1, 3, seed=1)
     assert np.isnan(alone.error_variance("aof-gaussian").standard_error).all()
     assert np.isnan(alone.difference(*alone.names).p_value()).all()
     assert not any(verdict.worst for verdict in alone.verdicts())
 
 
 def test_means_over_no_steps():
-    result = compare(BOTH, BENT, 256, 4, seed=1, progress=False)
+    result = compare(BOTH, BENT, 256, 4, seed=1)
     with pytest.raises(ValueError, match="none of the 4 steps"):
         result.ranking(slice(4, None))
     object.__setattr__(result, "doubtful", np.array([True, True, False, False]))

@@ -5,6 +5,7 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from kfcourse import Model, ModelError, run, simulate
@@ -25,7 +26,7 @@ def test_on_a_linear_model_it_is_the_kalman_filter_s_covariance():
         meter_noise={"mean": [0.4, 0], "variance": [[1.0, 0.6], [0.6, 2.0]]},
     )
     expected = run(kalman_filter(model), simulate(model, 1, 8, seed=1).y).cov[:, 0]
-    np.testing.assert_allclose(posterior_bound(model, 3, 8, seed=2).value, expected, rtol=1e-10)
+    assert_allclose(posterior_bound(model, 3, 8, seed=2).value, expected, rtol=1e-10)
 
 
 def test_the_first_step_is_an_integral():
@@ -109,7 +110,7 @@ def test_what_jumps_with_the_step_alone_is_known():
         for known in ("", "+ Heaviside(k - 2) + sign(k - 1) + (3 if k > 2 else 1) ")
     )
     # the same slopes and noises: by rounding only
-    np.testing.assert_allclose(driven.value, free.value, rtol=1e-12)
+    assert_allclose(driven.value, free.value, rtol=1e-12)
 
 
 def test_an_infinite_mean_is_seen_in_several_dimensions_too():
@@ -152,4 +153,4 @@ def test_a_prior_without_a_density_is_refused_and_units_do_not_matter(variance):
     tiny = posterior_bound(
         Model.define(state, meter, prior={"variance": [1, 1e-30]}), 10, 1, seed=1
     )
-    np.testing.assert_allclose(tiny.value[0], np.diag([0.5, 1e-30]), rtol=1e-12)
+    assert_allclose(tiny.value[0], np.diag([0.5, 1e-30]), rtol=1e-12)

@@ -6,18 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
-from kfcourse.filters.approximations import aof
-from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.optimal_structure import fos, mfos
-from kfcourse.filters.particles import particle
+from kfcourse import (
+    Ensemble,
+    Model,
+    NotFinite,
+    compare,
+    design,
+    gaussian,
+    likelihood,
+    linearised,
+    predictions,
+    run,
+    simulate,
+    smooth,
+)
+from kfcourse.filters import aof, duof, fos, mfos, particle
 from kfcourse.laws import gain
-from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, side_by_side, simulate
-from kfcourse.montecarlo.experiment import _begun, compare, predictions, run
-from kfcourse.records import likelihood, smooth
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import gaussian, linearised
+from kfcourse.montecarlo.ensemble import side_by_side
+from kfcourse.montecarlo.experiment import _begun
 
 pytestmark = pytest.mark.quick
 
@@ -52,7 +60,7 @@ def test_the_seed_decides_the_trajectories(variant53):
         simulate(variant53, 50, 7, 1),
         simulate(variant53, 50, 7, 2),
     )
-    np.testing.assert_array_equal(first.y, again.y)
+    assert_array_equal(first.y, again.y)
     assert not np.isin(first.x[0], other.x[0]).any()
 
 
@@ -63,7 +71,7 @@ def test_ensembles_side_by_side_are_those_alone(variant53):
     for here, ensemble in zip((slice(3), slice(3, 8)), ensembles, strict=True):
         for each, both in zip(ensemble, together, strict=True):
             for alone, side in zip(each[:3], both[:3], strict=True):
-                np.testing.assert_array_equal(side[here], alone)
+                assert_array_equal(side[here], alone)
 
 
 # ---------------------------------------------------------------- compare
@@ -77,20 +85,17 @@ def numbers(comparison):
 
 
 def test_the_number_of_jobs_changes_nothing(variant53):
-    results = [
-        compare(lab_of(variant53), variant53, 2345, 6, seed=7, jobs=jobs, progress=False)
-        for jobs in (1, 3)
-    ]
+    results = [compare(lab_of(variant53), variant53, 2345, 6, seed=7, jobs=jobs) for jobs in (1, 3)]
     for first, second in zip(*map(numbers, results), strict=True):
-        np.testing.assert_array_equal(first, second)
+        assert_array_equal(first, second)
 
 
 def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
     filters = lab_of(variant53)
-    together = compare(filters, variant53, 500, 4, seed=7, progress=False)
+    together = compare(filters, variant53, 500, 4, seed=7)
     for filter_ in (filters[0], filters[2], filters[5]):
-        alone = compare([filter_], variant53, 500, 4, seed=7, progress=False)
-        np.testing.assert_array_equal(
+        alone = compare([filter_], variant53, 500, 4, seed=7)
+        assert_array_equal(
             alone.error_variance(filter_.name).value, together.error_variance(filter_.name).value
         )
 
@@ -98,7 +103,7 @@ def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
 @pytest.mark.parametrize(("runs", "steps"), [(1, 1), (3, 4), (129, 2)])
 @pytest.mark.filterwarnings("error")
 def test_small_experiments_run(vector, runs, steps):
-    result = compare(lab_of(vector), vector, runs, steps, seed=3, design_runs=200, progress=False)
+    result = compare(lab_of(vector), vector, runs, steps, seed=3, design_runs=200)
     for name in result.names:
         assert result.error_variance(name).value.shape == (steps,)
         assert np.isfinite(result.error_variance(name).value).all()
@@ -109,8 +114,8 @@ def test_the_design_ensemble_is_another_one(variant53):
     """On the design's own trajectories MFOS looks better than on fresh ones, and never worse than
     it would by chance."""
     filters = [aof(gaussian(variant53)), mfos(gaussian(variant53))]
-    same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True, progress=False)
-    fresh = compare(filters, variant53, 60, 1, seed=11, design_runs=20, progress=False)
+    same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True)
+    fresh = compare(filters, variant53, 60, 1, seed=11, design_runs=20)
     # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other
     # coefficients can be below.
     own, others = (result.gap("mfos-gaussian").value[0] for result in (same, fresh))
@@ -122,7 +127,7 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
 
     def peak(steps):
         tracemalloc.start()
-        compare(filters, variant53, runs, steps, seed=1, jobs=1, progress=False)
+        compare(filters, variant53, runs, steps, seed=1, jobs=1)
         outcome = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return outcome
@@ -157,7 +162,7 @@ def test_bad_arguments_are_value_errors_that_name_them(variant53, arguments, mes
     if call["filters"] == "other model":
         call["filters"] = [good, duof(vector)]
     with pytest.raises(ValueError, match=message):
-        compare(progress=False, **call)
+        compare(**call)
 
 
 @pytest.mark.parametrize("build", [lambda model: aof(gaussian(model)), duof])
@@ -165,7 +170,7 @@ def test_bad_arguments_are_value_errors_that_name_them(variant53, arguments, mes
 def test_a_diverging_model_says_so(build):
     model = Model.define("x**3*2 + v", "x + w")
     with pytest.raises(NotFinite, match=r"(become infinite|diverges)"):
-        compare([build(model)], model, 200, 12, seed=1, progress=False)
+        compare([build(model)], model, 200, 12, seed=1)
 
 
 @pytest.mark.filterwarnings("error")
@@ -187,7 +192,7 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
     def cancelling(state, y):
         yield gain(np.ones((1, 1)), np.array([[-165.0]]))
 
-    size, options = (model, 300, 4, 1), {"jobs": 1, "progress": False}
+    size, options = (model, 300, 4, 1), {"jobs": 1}
     good = [duof(model), aof(gaussian(model))]
     three = replace(good[0], name="three", equations=cancelling)
     result = compare([broken("first"), good[0], broken("two"), three, good[1]], *size, **options)
@@ -203,7 +208,7 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
     assert str(result.left_out["three"]).startswith(failed)
     with pytest.raises(KeyError, match="no results for 'first': step 2: first became infinite"):
         result.error_variance("first")
-    np.testing.assert_array_equal(
+    assert_array_equal(
         result.error_variance("duof").value,
         compare(good, *size, **options).error_variance("duof").value,
     )
@@ -218,11 +223,9 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
     y, scalar = simulate(variant53, 1, 5, seed=1).y, aof(gaussian(variant53))
     for given in (y[:, 0, 0], y[:, 0, 0].tolist()):
         for outcome, expected in zip(run(scalar, given), run(scalar, y), strict=True):
-            np.testing.assert_array_equal(outcome, expected)
+            assert_array_equal(outcome, expected)
     missing = np.where(np.arange(5) == 2, np.nan, y[:, 0, 0])
-    np.testing.assert_array_equal(
-        run(scalar, missing).mean, run(scalar, missing[:, None, None]).mean
-    )
+    assert_array_equal(run(scalar, missing).mean, run(scalar, missing[:, None, None]).mean)
 
     pair = aof(gaussian(vector))
     for filter_, measurements, message in (
@@ -260,5 +263,5 @@ def test_each_batch_of_a_comparison_has_particles_of_its_own(vector):
     first, second, again = (
         cloud.step(state, np.zeros((50, vector.p))).posterior.mean for state in starts
     )
-    np.testing.assert_array_equal(first, again)
+    assert_array_equal(first, again)
     assert (first != second).all()

@@ -5,16 +5,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy
+from numpy.testing import assert_allclose, assert_array_equal
 
-from kfcourse import Model, compare, gaussian, linearised
+from kfcourse import Ensemble, Gaussian, JumpModel, Model, compare, gaussian, linearised
 from kfcourse.continuous import sampled
 from kfcourse.filters import aof, duof, gpb2, imm, kalman_filter, particle, pointmass
 from kfcourse.lab import find_variant
-from kfcourse.laws import Gaussian
-from kfcourse.montecarlo.ensemble import Ensemble, side_by_side
+from kfcourse.montecarlo.ensemble import side_by_side
 from kfcourse.montecarlo.experiment import batch_sizes, states
 from kfcourse.montecarlo.scores import crps, scored
-from kfcourse.symbolic.jumping import JumpModel
 
 pytestmark = pytest.mark.quick
 
@@ -50,10 +49,10 @@ def test_crps_is_the_integral(y, means, deviations, weights):
 
 def test_crps_of_points():
     sure = crps(np.array([[-1.5], [0.0]]), np.zeros((2, 1)), np.ones((1, 1)))
-    np.testing.assert_array_equal(sure, [1.5, 0.0])
+    assert_array_equal(sure, [1.5, 0.0])
     point = crps(np.array([[0.0, 1.0]]), np.zeros((1, 2)), np.array([[0.5, 0.5]]))
     # P steps by a half at y and one below it: (1/2)^2 over a length of 1
-    np.testing.assert_allclose(point, 0.25, rtol=1e-15)
+    assert_allclose(point, 0.25, rtol=1e-15)
 
 
 def test_a_slow_loop():
@@ -88,7 +87,7 @@ def test_a_slow_loop():
             sizes.append(s @ normal_crps)
         wanted.append((np.mean(logs), np.mean(sizes)))
     ours = compared.log_score("aof-linearised"), compared.crps("aof-linearised")
-    np.testing.assert_allclose([each.value for each in ours], np.transpose(wanted), rtol=1e-6)
+    assert_allclose([each.value for each in ours], np.transpose(wanted), rtol=1e-6)
     # the first prediction is the same for all: the prior, by the Gaussian functions
     h, _, F, _ = normal.at(0).measure(*model.prior)
     assert compared.log_score("duof").value[0] == pytest.approx(law(h, F).logpdf(y[0]).mean())

@@ -7,13 +7,12 @@ from dataclasses import replace
 import answering
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from weekly import weekly
 
-from kfcourse import Model, compare, run, simulate
+from kfcourse import Model, compare, design, lab_filters, run, simulate
 from kfcourse.filters import pointmass
-from kfcourse.lab import lab_filters
-from kfcourse.lab.short_names import LAB
-from kfcourse.montecarlo.designing import design
+from kfcourse.lab import LAB
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.pages import browser as printed
 from kfcourse.symbolic.equations import compile_model
@@ -119,7 +118,7 @@ def test_the_same_draws_give_the_same_error_variances(page, id):
     assert tuple(result) == LAB
     for name in LAB:
         value, error = array(result[name]).T
-        np.testing.assert_allclose(
+        assert_allclose(
             value, of_package(SCALAR[id], name, designing, running), rtol=1e-9, err_msg=name
         )
         assert (error > 0).all()

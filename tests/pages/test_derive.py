@@ -9,7 +9,7 @@ import pytest
 from browsers import offline
 from derivation_corpus import chains, planted
 
-from kfcourse.lab import load_variants
+from kfcourse import load_variants
 from kfcourse.pages.derive import checked, described, field, shown
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -26,7 +26,7 @@ from scipy.stats import norm
 
 from kfcourse import Model, linearised, predictions, run
 from kfcourse.filters import aof, kalman_filter
-from kfcourse.lab.short_names import title
+from kfcourse.lab import title
 from kfcourse.linear.consistency import autocorrelation, innovations, nees, nis
 from kfcourse.pages.scenes import FAULTS, HIDDEN
 

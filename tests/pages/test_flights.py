@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from numpy.testing import assert_allclose
 
 from kfcourse.pages.flights import by_part, flight_and_errors, in_plan
 from kfcourse.scenarios.errors import rms_by_part
@@ -20,7 +21,7 @@ def curves(ax) -> dict:
 
 def test_errors_over_time(track):
     fig = flight_and_errors(track, {"Kalman": track.position[:, None] + [30.0, 0, 40]}, "Kalman")
-    np.testing.assert_allclose(curves(fig.axes[1])["Kalman"].get_ydata(), 50.0)
+    assert_allclose(curves(fig.axes[1])["Kalman"].get_ydata(), 50.0)
     plt.close(fig)
 
 
@@ -36,7 +37,7 @@ def test_pieces_in_plan_are_of_their_parts(track):
     for ax, part in zip(fig.axes, (1, 2, 3, 4), strict=True):
         path, estimate = ax.get_lines()[1].get_xydata(), curves(ax)["Kalman"].get_xydata()
         # km
-        np.testing.assert_allclose(estimate - path, np.tile([1.0, 0], (len(path), 1)), atol=1e-12)
+        assert_allclose(estimate - path, np.tile([1.0, 0], (len(path), 1)), atol=1e-12)
         on_part = track.position[track.part == part, :2] / 1000
         assert all(np.abs(on_part - place).sum(axis=1).min() < 1e-12 for place in path)
     plt.close(fig)

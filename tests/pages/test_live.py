@@ -11,12 +11,12 @@ import pytest
 from browsers import offline
 from numpy.testing import assert_allclose, assert_array_equal
 
+from kfcourse import read_measurements
 from kfcourse.lab import find_variant
 from kfcourse.laws import normalised_square
 from kfcourse.linear import smooth
 from kfcourse.linear.consistency import innovations, nis
 from kfcourse.pages import live
-from kfcourse.records import read_measurements
 from kfcourse.scenarios import pointer
 
 RECORDING = live.record(pointer.hand_track(seed=10), seed=6)

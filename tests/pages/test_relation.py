@@ -11,10 +11,9 @@ from gate.values import Indexed, Of, Unread
 from gate.worlds import world
 from numpy.testing import assert_allclose
 
-from kfcourse import Model, linearised
+from kfcourse import Gaussian, Model, linearised
 from kfcourse.filters import aof
 from kfcourse.filters.kalman import correct, predict
-from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem
 from kfcourse.pages import Unverified
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.pages.tables import table
+from kfcourse.pages import table
 from kfcourse.symbolic.typesetting import WIDTH, equation_latex, symbols
 
 pytestmark = pytest.mark.quick

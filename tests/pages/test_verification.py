@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.pages.verification import VERIFIED, Unverified, agree, claim, typeset, verified
+from kfcourse.pages import Unverified, agree, claim, typeset, verified
+from kfcourse.pages.verification import VERIFIED
 
 pytestmark = pytest.mark.quick
 

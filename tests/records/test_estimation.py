@@ -3,6 +3,7 @@ refusals."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import Model, ModelError, linearised, simulate
 from kfcourse.filters import aof
@@ -22,7 +23,7 @@ def test_the_nile_s_variances():
         build=lambda each: aof(linearised(each)),
     )
     # five digits are published
-    np.testing.assert_allclose(estimated.value, [1468.5, 15099.7], rtol=5e-5)
+    assert_allclose(estimated.value, [1468.5, 15099.7], rtol=5e-5)
     assert estimated.log_likelihood == pytest.approx(-641.5856, abs=5e-5)
     assert estimated.flat == ()
     assert float(estimated.model.parameters["q"]) == estimated.value[0]
@@ -74,7 +75,7 @@ def test_what_the_record_does_not_tell_is_named():
         "the record does not tell g (-1), s (+1) apart: changed together in these proportions "
         "they leave its likelihood as it is",
     }
-    np.testing.assert_array_equal(np.isinf(estimated.standard_error), [True, True, False])
+    assert_array_equal(np.isinf(estimated.standard_error), [True, True, False])
     # with one of them known, the other and r are what they are with both free
     alone = estimate(model, y, ["s", "r"], ["s", "r"])
     assert alone.flat == ()

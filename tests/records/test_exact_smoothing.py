@@ -6,11 +6,12 @@ import itertools
 import numpy as np
 import pytest
 import sympy as sp
+from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import Model, compare, gaussian, linearised, run, simulate, smooth
 from kfcourse.filters import aof, kalman_filter, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
-from kfcourse.lab.variants import find_variant
+from kfcourse.lab import find_variant
 from kfcourse.records import smoothing_error
 
 pytestmark = pytest.mark.quick
@@ -106,7 +107,7 @@ def test_it_is_the_posterior_of_the_whole_trajectory(name, missing):
         # what the cube leaves out
         assert (np.abs(smoothed.mean[:, i, 0] - mean) <= error[:, i] + 1e-6 * sds).all()
         # the accuracy asked for is 1e-3
-        np.testing.assert_allclose(smoothed.cov[:, i, 0, 0], variance, rtol=1e-4)
+        assert_allclose(smoothed.cov[:, i, 0, 0], variance, rtol=1e-4)
     assert error.max() < 1e-3 * np.sqrt(smoothed.cov.max())
 
 
@@ -137,10 +138,10 @@ def test_with_a_lag_it_is_the_posterior_of_a_shorter_record(lag):
         shorter = smooth(filter_, y[: k + lag + 1])
         assert (abs(smoothed.mean[k] - shorter.mean[k])[:, 0] <= 2 * error[k] + ROUNDING).all()
         # the accuracy asked for is 1e-3
-        np.testing.assert_allclose(smoothed.cov[k], shorter.cov[k], rtol=1e-4)
+        assert_allclose(smoothed.cov[k], shorter.cov[k], rtol=1e-4)
     later = smooth(filter_, y).mean
     assert np.abs(smoothed.mean - later)[0].min() > 0.01
-    np.testing.assert_array_equal(smoothed.mean[3 - lag :], later[3 - lag :])
+    assert_array_equal(smoothed.mean[3 - lag :], later[3 - lag :])
 
 
 # ---------------------------------------------------------------- comparison
@@ -150,7 +151,7 @@ def test_smoothers_are_compared_with_the_exact_one():
     model = find_variant("53").model
     gaof, exact = aof(gaussian(model)), pointmass(model)
     smoothers = gaof, aof(linearised(model)), exact
-    both = compare([gaof, exact], model, 400, 4, seed=1, smoothers=smoothers, progress=False)
+    both = compare([gaof, exact], model, 400, 4, seed=1, smoothers=smoothers)
     smoothed = both.smoothing
     assert smoothed.names == ("aof-gaussian", "aof-linearised", "aof-exact")
     # after the last measurement nothing comes; on the same trajectories

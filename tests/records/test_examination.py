@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from kfcourse import Model, likelihood, linearised, predictions, run, simulate, smooth
 from kfcourse.filters import aof, gated
@@ -29,8 +30,8 @@ def test_the_parts_are_those_of_the_package():
         (examined.innovations.cov, np.broadcast_to(direct.cov, examined.innovations.cov.shape)),
         (examined.log_likelihood, likelihood(filter_, y)),
     ):
-        np.testing.assert_array_equal(ours, theirs)
-    np.testing.assert_array_equal(np.isnan(examined.weight), np.isnan(y).all(axis=-1))
+        assert_array_equal(ours, theirs)
+    assert_array_equal(np.isnan(examined.weight), np.isnan(y).all(axis=-1))
     assert set(examined.weight[~np.isnan(examined.weight)]) == {1.0}
 
 

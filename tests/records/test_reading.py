@@ -6,10 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
-from kfcourse import Model, read_measurements
+from kfcourse import Model, ModelError, read_measurements
 from kfcourse.records.reading import RecordError, RecordWarning
-from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
 
@@ -35,10 +35,8 @@ def read(tmp_path):
 
 
 def expected(record):
-    np.testing.assert_array_equal(record.times, [0, 0.5, 2, 2])
-    np.testing.assert_array_equal(
-        record.y[:, 0], [[1.5, np.nan], [np.nan, -3], [1, np.nan], [7, 8]]
-    )
+    assert_array_equal(record.times, [0, 0.5, 2, 2])
+    assert_array_equal(record.y[:, 0], [[1.5, np.nan], [np.nan, -3], [1, np.nan], [7, 8]])
     assert record.model.known.inputs == {"dt": (0.5, 1.5, 0.0, 0.0), "a": (2.0, 2.0, 4.0, 5.0)}
 
 
@@ -88,7 +86,7 @@ def test_columns_may_have_other_names(read):
 
 def test_the_interval_may_be_a_column_where_there_are_no_times(read):
     record = read("dt,y1,y2,a\n0.5,1,2,3\n1.5,1,2,3\n1,1,2,3\n")
-    np.testing.assert_array_equal(record.times, [0, 0.5, 2])
+    assert_array_equal(record.times, [0, 0.5, 2])
     assert record.model.known.inputs["dt"] == (0.5, 1.5, 1.0)
 
 
@@ -122,9 +120,7 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
     """But not those before the names or after the last row, nor of several columns, where a missing
     row has its commas."""
     for end in ("", "\n", "\n\n\n"):
-        np.testing.assert_array_equal(
-            read(f"\n\ny\n1\n\n  \n4{end}", PLAIN).y.ravel(), [1, np.nan, np.nan, 4]
-        )
+        assert_array_equal(read(f"\n\ny\n1\n\n  \n4{end}", PLAIN).y.ravel(), [1, np.nan, np.nan, 4])
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
-from kfcourse.montecarlo.ensemble import simulate
+from kfcourse import simulate
 from kfcourse.scenarios.ballistic import thrown_body
 
 pytestmark = pytest.mark.quick
@@ -17,11 +18,9 @@ def test_without_drag_and_noise_it_flies_a_parabola():
     # Euler's steps
     along, height = 14_000 - 350 * T * k, 3_000 + 120 * T * k - gravity * T**2 * k * (k - 1) / 2
     tolerance = 1e-4  # m: a prior known to 300 nm and 30 nm/s
-    np.testing.assert_allclose(
-        flight.x[:, 0, :2], np.stack([along, height], axis=-1), atol=tolerance, rtol=0
-    )
+    assert_allclose(flight.x[:, 0, :2], np.stack([along, height], axis=-1), atol=tolerance, rtol=0)
     seen = np.stack([np.hypot(along, height), np.arctan(height / along)], axis=-1)
-    np.testing.assert_allclose(flight.y[:, 0], seen, rtol=1e-7)
+    assert_allclose(flight.y[:, 0], seen, rtol=1e-7)
 
 
 def test_drag_slows_the_body_along_its_velocity():
@@ -30,7 +29,7 @@ def test_drag_slows_the_body_along_its_velocity():
         simulate(thrown_body(kappa=kappa, **still), 50, 2, seed=3).x[..., 2:] for kappa in (0, 1e-4)
     )
     lost = np.linalg.norm(free[0], axis=-1, keepdims=True) * 0.5 * 1e-4  # T kappa |v|
-    np.testing.assert_allclose(slowed[1], free[0] * (1 - lost), rtol=1e-12)
+    assert_allclose(slowed[1], free[0] * (1 - lost), rtol=1e-12)
 
 
 def test_an_unknown_parameter_is_named():

@@ -3,6 +3,7 @@
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from kfcourse import linearised, run, simulate
@@ -43,7 +44,7 @@ def test_the_attractor_is_that_of_lorenz():
     assert np.flatnonzero(seen).tolist() == list(range(25, 301, 25))
     noise = (y - x)[seen]
     assert abs(noise.std() / np.sqrt(2) - 1) < 4 / np.sqrt(2 * noise.size)
-    np.testing.assert_allclose(x[1:], step(x[:-1]), rtol=1e-9, atol=1e-9)  # nothing disturbs it
+    assert_allclose(x[1:], step(x[:-1]), rtol=1e-9, atol=1e-9)  # nothing disturbs it
 
 
 def test_the_extended_filter_has_the_published_errors():
@@ -91,7 +92,7 @@ def test_the_car_of_the_source():
     prior = np.array([0, 0, 1, -1.0]), np.eye(4)
     means = [mean for _, (mean, _) in oracles.kalman_loop([step] * 101, prior, y[:, 0])]
     # 100 steps of rounding
-    np.testing.assert_allclose(run(kalman_filter(car()), y).mean[:, 0], means, rtol=0, atol=1e-10)
+    assert_allclose(run(kalman_filter(car()), y).mean[:, 0], means, rtol=0, atol=1e-10)
     for name, place in (("measurements", y[1:, 0]), ("Kalman", np.array(means)[1:, :2])):
         assert abs(np.sqrt(((place - x[:, :2]) ** 2).sum(axis=1).mean()) - CAR_ERRORS[name]) < 1e-12
 
@@ -105,7 +106,7 @@ def test_the_conditionally_minimax_models_are_those_of_the_source():
         (inverse_cube_root(), np.minimum(100, 1 / np.cbrt(x)), x),
     ):
         a, b = compile_noiseless(model)
-        np.testing.assert_allclose(a(x[:, None])[:, 0], following, rtol=1e-12)
-        np.testing.assert_allclose(b(x[:, None])[:, 0], seen, rtol=1e-12)
+        assert_allclose(a(x[:, None])[:, 0], following, rtol=1e-12)
+        assert_allclose(b(x[:, None])[:, 0], seen, rtol=1e-12)
         for law in (model.state_noise, model.meter_noise):
             assert (law.mean, law.cov) == (0, 1)

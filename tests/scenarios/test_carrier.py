@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
-from kfcourse.montecarlo.ensemble import simulate
+from kfcourse import simulate
 from kfcourse.scenarios.carrier import PARAMETERS, phase_meter
 
 pytestmark = pytest.mark.quick
@@ -18,7 +19,7 @@ def test_without_noise_it_is_a_cosine(order, offset):
     seen = simulate(quiet, 1, 50, seed=1).y[:, 0, 0]
     k = np.arange(50)
     expected = 3 * np.cos(2 * np.pi * k / PARAMETERS["N"] + 0.4 + offset * PARAMETERS["T"] * k)
-    np.testing.assert_allclose(seen, expected, atol=1e-12)  # rounding of 50 added steps
+    assert_allclose(seen, expected, atol=1e-12)  # rounding of 50 added steps
 
 
 def test_bad_orders_and_names_are_named():

@@ -6,6 +6,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse.scenarios.drive import RADIUS, fixes, recorded, turned
 
@@ -27,7 +28,7 @@ def test_the_record_is_the_file_s():
         [float(row[f"{name}_deg"]) for row in (first, last)] for name in ("latitude", "longitude")
     )
     step = [degree * np.cos(np.radians(lat[0])) * (lon[1] - lon[0]), degree * (lat[1] - lat[0])]
-    np.testing.assert_allclose(record.place[filled[-1]], step, rtol=1e-9)
+    assert_allclose(record.place[filled[-1]], step, rtol=1e-9)
     assert record.yaw_rate[0] == pytest.approx(np.radians(-18.713)) and record.speed[
         0
     ] == pytest.approx(2.42 / 3.6)
@@ -42,7 +43,7 @@ def test_the_notice_stands_beside_it():
 def test_fixes_are_thinned_and_begin_when_the_car_moves():
     times, place = fixes()
     assert place.shape == (len(times), 1, 2) and times[0] >= 6 and not np.isnan(place).any()
-    np.testing.assert_array_equal(fixes(every=5)[1], place[::5])
+    assert_array_equal(fixes(every=5)[1], place[::5])
     with pytest.raises(ValueError, match="every must be a positive whole number"):
         fixes(0)
 

@@ -4,6 +4,7 @@ import numpy as np
 import oracles
 import pytest
 import sympy as sp
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 from kfcourse.linear.system import linear_system
@@ -51,11 +52,9 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
     solved = solve_ivp(slope, (0, track.time[-1]), first, t_eval=track.time, **options).y.T
     # Tolerance 1e-12 of 4e4 m over some 10^3 steps; the kinks of the ramps and the interpolation
     # between steps cost more.
-    np.testing.assert_allclose(track.position, solved[:, :3], rtol=0, atol=1e-4)
-    np.testing.assert_allclose(
-        np.linalg.norm(track.velocity[:, :2], axis=1), solved[:, 3], rtol=0, atol=1e-6
-    )
-    np.testing.assert_array_equal(track.part, 1 + np.searchsorted(ends[:4], track.time))
+    assert_allclose(track.position, solved[:, :3], rtol=0, atol=1e-4)
+    assert_allclose(np.linalg.norm(track.velocity[:, :2], axis=1), solved[:, 3], rtol=0, atol=1e-6)
+    assert_array_equal(track.part, 1 + np.searchsorted(ends[:4], track.time))
 
 
 @pytest.mark.parametrize(
@@ -119,12 +118,10 @@ def test_matrices_of_the_kinematic_models():
     T, q, r = 0.7, 3.0, 20.0
     system, _, _ = linear_system(kinematic(T, dimensions=2, noise_sd=q, measurement_sd=r))
     g = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
-    np.testing.assert_allclose(
-        system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15
-    )
-    np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
-    np.testing.assert_allclose(system.R, r**2 * np.eye(2), rtol=1e-15)
-    np.testing.assert_array_equal(system.H, np.eye(2, 4))
+    assert_allclose(system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15)
+    assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
+    assert_allclose(system.R, r**2 * np.eye(2), rtol=1e-15)
+    assert_array_equal(system.H, np.eye(2, 4))
     assert [s.name for s in kinematic(T).x] == ["x", "y", "z", "vx", "vy", "vz"]
 
 
@@ -151,8 +148,8 @@ def test_rms_by_part_by_hand():
     assert rms.standard_error == pytest.approx(abs(alone[:, 0] - alone[:, 1]) / 2)
     assert rms.freedom == 1
     difference = rms_difference(error, 0 * error, part)
-    np.testing.assert_array_equal(difference.value, rms.value)
-    np.testing.assert_array_equal(difference.standard_error, rms.standard_error)
+    assert_array_equal(difference.value, rms.value)
+    assert_array_equal(difference.standard_error, rms.standard_error)
     with pytest.raises(ValueError, match="of the same runs, got 2 and 4"):
         rms_difference(error, np.tile(error, (1, 2, 1)), part)
     for few, labels in ((error[:, :1], part), (error, part[:2])):

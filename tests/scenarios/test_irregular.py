@@ -3,6 +3,7 @@
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_array_equal
 
 from kfcourse.scenarios.irregular import irregular_track
 
@@ -12,7 +13,7 @@ pytestmark = pytest.mark.quick
 def test_shares_and_sizes_are_those_asked_for():
     track = irregular_track(2, runs=50)
     missing = np.isnan(track.y)
-    np.testing.assert_array_equal(missing[..., 0], missing[..., 1])
+    assert_array_equal(missing[..., 0], missing[..., 1])
     assert not (track.outlier & missing[..., 0]).any()
     for happens, share in ((missing[..., 0], 0.15), (track.outlier, 0.05 * 0.85)):
         oracles.is_mean(share, happens)

@@ -12,8 +12,9 @@ import numpy as np
 import oracles
 import pytest
 import scipy.linalg
+from numpy.testing import assert_allclose, assert_array_equal
 
-from kfcourse.laws import Gaussian
+from kfcourse import Gaussian
 from kfcourse.linear.consistency import nees
 from kfcourse.scenarios.navigation import (
     Clock,
@@ -119,7 +120,7 @@ def test_clock_is_found_from_pairs():
     exact = Clock.fit(times, readings)
     # readings of 3e5 s are rounded to 3e-11 s, the span is 600 s
     assert exact.rate == pytest.approx(clock.rate, abs=1e-12)
-    np.testing.assert_allclose(exact.time(readings), times, rtol=0, atol=1e-9)
+    assert_allclose(exact.time(readings), times, rtol=0, atol=1e-9)
 
     sigma = 1e-3
     noisy = times + sigma * np.random.default_rng(5).normal(size=200)
@@ -136,7 +137,7 @@ def test_captures_are_even_on_the_sensors_own_clock():
     times = sensor.captures(2.0)
     # readings 0.1 + 0.4 k between -0.3 and 2.9: -0.3, 0.1, ..., 2.9, at the filter's times 0, 0.25,
     # ..., 2
-    np.testing.assert_allclose(times, 0.25 * np.arange(9), rtol=0, atol=1e-15)
+    assert_allclose(times, 0.25 * np.arange(9), rtol=0, atol=1e-15)
     # ends that are moments of capture but for rounding: 0.3 / 0.1 < 3, and the reading 0.1 + 0.2 at
     # the start is above 3 * 0.1
     for clock in (Clock(), Clock(shift=0.1 + 0.2)):
@@ -156,7 +157,7 @@ def test_what_is_observed():
     messages = observe([sensor], truth, 3.0, seed=6)
     times = np.array([clock.time(m.tag) for m in messages])
     order = np.argsort(times)
-    np.testing.assert_allclose(times[order], sensor.captures(3.0), rtol=0, atol=1e-12)
+    assert_allclose(times[order], sensor.captures(3.0), rtol=0, atol=1e-12)
     delays = np.array([m.arrival for m in messages]) - times
     assert ((delays >= 0.2) & (delays <= 0.25)).all() and np.std(delays) > 0.005
     assert [m.arrival for m in messages] == sorted(m.arrival for m in messages)
@@ -247,8 +248,8 @@ def test_late_measurements_are_used_as_on_the_page(with_inputs):
     ours = fuse(dynamics, sensors, PRIOR, messages, outputs, inputs=inputs)
     for k, now in enumerate(outputs):
         mean, cov = slow_filter(messages, sensors, now, inputs)
-        np.testing.assert_allclose(ours.mean[k, 0], mean, rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(ours.cov[k, 0], cov, rtol=0, atol=ROUNDING)
+        assert_allclose(ours.mean[k, 0], mean, rtol=0, atol=ROUNDING)
+        assert_allclose(ours.cov[k, 0], cov, rtol=0, atol=ROUNDING)
 
 
 # ---------------------------------------------------------------- fusion: nonlinear sensors
@@ -339,9 +340,7 @@ def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_
     sensors, times = two_sensors(latency=0.3, jitter=0.2), np.linspace(0.1, 4, 14)
     _, messages = measured(sensors, 3.0, 2, [0.0])
     followed = follow(FREE, sensors, PRIOR, messages, times)
-    np.testing.assert_array_equal(
-        followed.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean
-    )
+    assert_array_equal(followed.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean)
     ordered = sorted(messages, key=lambda message: message.tag)
     assert [(each.sensor, each.time) for each in followed.innovations] == [
         (m.sensor, pytest.approx(m.tag)) for m in ordered
@@ -351,11 +350,9 @@ def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_
         earlier = [m._replace(arrival=m.tag) for m in ordered if m.tag < now.tag]
         before = fuse(FREE, sensors, PRIOR, earlier, [now.tag])
         H, R = METERS[now.sensor]
-        np.testing.assert_allclose(
-            newest.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING
-        )
+        assert_allclose(newest.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING)
         cov = np.broadcast_to(H @ before.cov[0, :1] @ H.T + R, newest.cov.shape)
-        np.testing.assert_allclose(newest.cov, cov, rtol=0, atol=ROUNDING)
+        assert_allclose(newest.cov, cov, rtol=0, atol=ROUNDING)
 
 
 def test_a_recorded_sensor_needs_no_period():
@@ -365,7 +362,7 @@ def test_a_recorded_sensor_needs_no_period():
         for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))
     ]
     laws = [fuse(FREE, [each], PRIOR, messages, np.array([1.0])) for each in (given, free)]
-    np.testing.assert_array_equal(laws[0].mean, laws[1].mean)
+    assert_array_equal(laws[0].mean, laws[1].mean)
     with pytest.raises(ValueError, match="s has no period, as a recorded sensor"):
         free.captures(1.0)
 

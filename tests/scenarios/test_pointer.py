@@ -3,6 +3,7 @@ samples."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from kfcourse.scenarios.pointer import (
     SHORTEST,
@@ -24,14 +25,14 @@ def test_the_matrices_are_those_of_the_paper():
     model_ = uniform_acceleration(dt, sd, 3.0)
     F = [[1, 0, dt, 0], [0, 1, 0, dt], [0, 0, 1, 0], [0, 0, 0, 1]]
     G = np.diag([dt**2 / 2, dt**2 / 2, dt, dt])  # acts on (ax, ay, ax, ay)
-    np.testing.assert_allclose(model_.A, F, rtol=1e-15)
-    np.testing.assert_allclose(model_.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
-    np.testing.assert_allclose(model_.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
-    np.testing.assert_allclose(model_.R, 9 * np.eye(2), rtol=1e-15)
+    assert_allclose(model_.A, F, rtol=1e-15)
+    assert_allclose(model_.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
+    assert_allclose(model_.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
+    assert_allclose(model_.R, 9 * np.eye(2), rtol=1e-15)
     # Covariance of what a random acceleration (ax, ay), constant in the interval, does to (x, y,
     # vx, vy).
     effect = G @ np.array([[1, 0], [0, 1], [1, 0], [0, 1]])
-    np.testing.assert_allclose(model_.Q, sd**2 * effect @ effect.T, rtol=1e-13)
+    assert_allclose(model_.Q, sd**2 * effect @ effect.T, rtol=1e-13)
 
 
 # ---------------------------------------------------------------- start-up
@@ -45,9 +46,7 @@ def test_the_start_up_is_the_parabola_through_three_samples():
     for run in range(5):
         for axis in range(2):
             c2, c1, c0 = np.polyfit(t, y[:, run, axis], 2)
-            np.testing.assert_allclose(
-                law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11
-            )
+            assert_allclose(law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11)
 
 
 # ---------------------------------------------------------------- the filter
@@ -61,11 +60,11 @@ def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly():
     laws = follow(uniform_acceleration(dt, 100.0, 2.0), position, dt, u)
     truth = np.concatenate([position, velocity], axis=-1)
     assert laws.posterior.mean.shape == (17, 1, 4)
-    np.testing.assert_allclose(laws.posterior.mean, truth[3:], rtol=1e-11)
-    np.testing.assert_allclose(laws.predicted.mean, truth[3:], rtol=1e-11)
+    assert_allclose(laws.posterior.mean, truth[3:], rtol=1e-11)
+    assert_allclose(laws.predicted.mean, truth[3:], rtol=1e-11)
     # Without the input the first prediction misses by B a, and the filter lags.
     without = follow(uniform_acceleration(dt, 100.0, 2.0), position, dt)
-    np.testing.assert_allclose(
+    assert_allclose(
         (truth[3:] - without.predicted.mean)[0, 0],
         np.concatenate([a * dt**2 / 2, a * dt]),
         rtol=1e-9,
@@ -82,10 +81,8 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     assert (position >= -1e-9).all() and (position <= np.array([640, 400]) + 1e-9).all()
     assert (np.hypot(*track.displacement.T) >= SHORTEST).all()
     before, after = track.at(np.array(-1.0)), track.at(np.array(track.end + 1))
-    np.testing.assert_allclose(before.position, track.origin, rtol=1e-12)
-    np.testing.assert_allclose(
-        after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12
-    )
+    assert_allclose(before.position, track.origin, rtol=1e-12)
+    assert_allclose(after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12)
     for motion in (before, after):
         assert not motion.velocity.any() and not motion.acceleration.any()
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_allclose
 
-from kfcourse.laws import Gaussian
+from kfcourse import Gaussian
 from kfcourse.linear import covariances
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
@@ -33,7 +34,7 @@ def test_positions_step_by_step(control):
         steps = [(A, a, 0.25 * B @ B.T, H, np.zeros(3), 4.0 * np.eye(3)) for a in u[:, i] @ B.T]
         loop = oracles.kalman_loop(steps, (start.mean[i], start.cov), y[:, i])
         expected = [mean[:3] for _, (mean, _) in loop]
-        np.testing.assert_allclose(estimates[:, i], expected, rtol=1e-10, atol=1e-12)  # rounding
+        assert_allclose(estimates[:, i], expected, rtol=1e-10, atol=1e-12)  # rounding
 
 
 def test_a_rough_start_has_the_gain_that_is_asked_for_and_spreads_as_it_says():
@@ -45,9 +46,7 @@ def test_a_rough_start_has_the_gain_that_is_asked_for_and_spreads_as_it_says():
     error = (law.mean - state) / sd
     assert (np.abs(error.mean(axis=0)) < 4 / np.sqrt(20_000)).all()
     # a sample correlation scatters by at most 1 / sqrt(runs)
-    np.testing.assert_allclose(
-        np.corrcoef(error.T), law.cov / np.outer(sd, sd), atol=4 / np.sqrt(20_000)
-    )
+    assert_allclose(np.corrcoef(error.T), law.cov / np.outer(sd, sd), atol=4 / np.sqrt(20_000))
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
+from numpy.testing import assert_allclose, assert_array_equal
 
+from kfcourse import Model, ModelError, linearised
 from kfcourse.symbolic.codegen import _shared, compile_function
 from kfcourse.symbolic.formula import symbol
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import linearised
 
 pytestmark = pytest.mark.quick
 
@@ -60,9 +59,9 @@ def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
     computed = compile_function(ARGUMENTS, [together, list(together[:, 0])])(*ensemble)
     assert computed[0].shape == (50, count, 2)
     for i in range(count):
-        np.testing.assert_allclose(computed[1][:, i], computed[0][:, i, 0], rtol=0, atol=0)
+        assert_allclose(computed[1][:, i], computed[0][:, i, 0], rtol=0, atol=0)
         for j in range(2):
-            np.testing.assert_allclose(
+            assert_allclose(
                 computed[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12
             )
 
@@ -87,9 +86,9 @@ def test_leading_axes_broadcast(ensemble):
     x, p = ensemble
     code = compile_function(ARGUMENTS, [[x1 * p11, x2 - p12]])
     expected = code(x, np.broadcast_to(p[0], p.shape))[0]
-    np.testing.assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
-    np.testing.assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
-    np.testing.assert_array_equal(code(x[3], p[0])[0], expected[3])  # no leading axes at all
+    assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
+    assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
+    assert_array_equal(code(x[3], p[0])[0], expected[3])  # no leading axes at all
 
 
 def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
@@ -109,9 +108,9 @@ def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
     rest = [(1, 1), (50, 1), (50, 1)]
     assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2), *rest]
     assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2), *rest]
-    np.testing.assert_allclose(code(x, p)[3], np.sqrt(2), rtol=1e-15)
-    np.testing.assert_allclose(code(x, p)[4], 2**0.25, rtol=1e-15)
-    np.testing.assert_allclose(code(x, p[0])[1], code(x, p)[1][0], rtol=1e-14)
+    assert_allclose(code(x, p)[3], np.sqrt(2), rtol=1e-15)
+    assert_allclose(code(x, p)[4], 2**0.25, rtol=1e-15)
+    assert_allclose(code(x, p[0])[1], code(x, p)[1][0], rtol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["np", "x", "s0", "return_", "Dummy", "a0001", "a0002", "E", "I"])
@@ -121,9 +120,7 @@ def test_no_symbol_can_hide_another(name, ensemble):
     value = odd**2 + sp.sin(odd) + x2
     computed = compile_function([[odd, x2]], [[value]])(ensemble[0])[0]
     first, second = ensemble[0].T
-    np.testing.assert_allclose(
-        computed[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14
-    )
+    assert_allclose(computed[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14)
 
 
 def compiled(*expressions):
@@ -134,9 +131,7 @@ def test_special_functions_are_scipys():
     computed = compiled(sp.erf(symbol("x")), sp.loggamma(symbol("x")))(
         np.array([[0.5, 0.0], [2.0, 0.0]])
     )[0]
-    np.testing.assert_allclose(
-        computed, [[math.erf(x), math.lgamma(x)] for x in (0.5, 2.0)], rtol=1e-14
-    )
+    assert_allclose(computed, [[math.erf(x), math.lgamma(x)] for x in (0.5, 2.0)], rtol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import sys
 import pytest
 import sympy as sp
 
-from kfcourse.symbolic.formula import FormulaError, check_name, parse, symbol
+from kfcourse import FormulaError
+from kfcourse.symbolic.formula import check_name, parse, symbol
 
 pytestmark = pytest.mark.quick
 

@@ -4,8 +4,8 @@ what it prints."""
 import pytest
 import sympy as sp
 
+from kfcourse import ModelError
 from kfcourse.symbolic import javascript
-from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
 

@@ -3,6 +3,7 @@
 import numpy as np
 import oracles
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import JumpModel, Model, ModelError, simulate
 from kfcourse.symbolic.averaging import averaged_equations
@@ -46,8 +47,8 @@ def test_a_mode_is_a_model_of_what_holds_for_all_and_of_what_differs():
 
 def test_a_single_row_is_a_mode_drawn_anew_at_each_step():
     model = define(transition=[0.75, 0.25], first=None)
-    np.testing.assert_array_equal(model.transition_at(3), [[0.75, 0.25], [0.75, 0.25]])
-    np.testing.assert_array_equal(model.first, [0.75, 0.25])
+    assert_array_equal(model.transition_at(3), [[0.75, 0.25], [0.75, 0.25]])
+    assert_array_equal(model.first, [0.75, 0.25])
 
 
 @pytest.mark.parametrize(
@@ -63,8 +64,8 @@ def test_a_single_row_is_a_mode_drawn_anew_at_each_step():
 def test_the_chain_may_depend_on_time_and_parameters(changes, chain):
     model, law = define(**changes), [0.8, 0.2]
     for k in range(6):
-        np.testing.assert_allclose(model.transition_at(k), chain(k), rtol=1e-14)
-        np.testing.assert_allclose(model.law_at(k), law, rtol=1e-12)
+        assert_allclose(model.transition_at(k), chain(k), rtol=1e-14)
+        assert_allclose(model.law_at(k), law, rtol=1e-12)
         law = law @ np.array(chain(k))
 
 
@@ -109,8 +110,8 @@ def test_averaged_equations():
     state, meter = averaged_equations(model)
     x = np.array([[2.0], [3.0]])
     law = model.law_at(3)
-    np.testing.assert_allclose(state(x, 2), law[0] * 0.9 * x + law[1] * x**2, rtol=1e-12)
-    np.testing.assert_allclose(meter(x, 2), x, rtol=1e-12)
+    assert_allclose(state(x, 2), law[0] * 0.9 * x + law[1] * x**2, rtol=1e-12)
+    assert_allclose(meter(x, 2), x, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +164,7 @@ def test_what_does_not_fit_is_refused_in_words(changes, message):
 def test_a_lost_trajectory_spoils_no_other():
     model = define(transition=[["1/(1 + x**2)", "x**2/(1 + x**2)"], [0.3, 0.7]])
     rows = model.transition_of(np.array([[1.0], [np.nan]]), 0)
-    np.testing.assert_allclose(rows[0], [[0.5, 0.5], [0.3, 0.7]])
+    assert_allclose(rows[0], [[0.5, 0.5], [0.3, 0.7]])
 
 
 def test_a_chain_that_fails_late_says_so_when_it_comes_there():

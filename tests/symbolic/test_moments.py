@@ -5,7 +5,7 @@ import oracles
 import pytest
 import sympy as sp
 
-from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+from kfcourse import GaussianMoments, NoClosedForm
 
 pytestmark = pytest.mark.quick
 

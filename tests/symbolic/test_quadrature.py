@@ -5,16 +5,22 @@ import warnings
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
-from kfcourse import Model, gaussian, likelihood, linearised, run, simulate
-from kfcourse.filters.approximations import aof
-from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
-from kfcourse.symbolic.quadrature import (
+from kfcourse import (
+    Model,
     QuadratureWarning,
-    axes,
     gauss_hermite,
+    gaussian,
+    likelihood,
+    linearised,
+    run,
+    simulate,
     unscented,
 )
+from kfcourse.filters import aof
+from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
+from kfcourse.symbolic.quadrature import axes
 
 
 @pytest.mark.parametrize(
@@ -49,7 +55,7 @@ def test_a_known_state_has_no_part_in_the_unexplained(kind):
     for y in simulate(model, 3, 30, seed=2).y:
         G, F, R = structure.measure(*state.predicted)[1:]
         explained = G @ state.predicted.cov @ np.swapaxes(G, -1, -2)
-        np.testing.assert_allclose(F - explained, R, rtol=1e-12)
+        assert_allclose(F - explained, R, rtol=1e-12)
         assert (R >= 1.5).all()
         assert not G[..., 1].any()
         state = filter_.step(state, y)
@@ -69,7 +75,7 @@ def test_two_collinear_exact_meters_of_a_constant_state(kind, slopes):
     x, y = simulate(model, 200, 20, seed=2)
     estimates = run(aof(kind(model)), y)
     left = 1e8 * (np.eye(2) - np.outer(slopes, slopes) / np.dot(slopes, slopes))
-    np.testing.assert_allclose(
+    assert_allclose(
         np.broadcast_to(estimates.cov, (20, 200, 2, 2)),
         np.broadcast_to(left, (20, 200, 2, 2)),
         atol=1.0,
@@ -91,9 +97,9 @@ def test_slopes_are_seen_in_directions_without_variance(kind, units):
     cov = 1e8 * np.array([[1.0, -1.0], [-1.0, 1.0]]) / np.outer(units, units)
     G, F, R = kind(model).measure(np.array([3.0, 4.0]) / units, cov)[1:]
     # the enlarged variances are 2e-14 of 1e8, so slopes have half of the digits
-    np.testing.assert_allclose(G[1:], np.array([[1, -1], [1, 1]]) * units, rtol=1e-6)
-    np.testing.assert_allclose(np.diagonal(F), [0, 4e8, 1], rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(R[0], 0, atol=1e-20)
+    assert_allclose(G[1:], np.array([[1, -1], [1, 1]]) * units, rtol=1e-6)
+    assert_allclose(np.diagonal(F), [0, 4e8, 1], rtol=1e-6, atol=1e-6)
+    assert_allclose(R[0], 0, atol=1e-20)
 
 
 BOTH = {"mean": [0, 0], "variance": [[1.0, 0.5], [0.5, 1.0]]}
@@ -156,8 +162,8 @@ def test_what_a_meter_does_not_tell_is_exactly_nothing(kind, units):
     )
     with warnings.catch_warnings(action="ignore", category=QuadratureWarning):
         measured = kind(model).measure(np.zeros((3, 1)), np.array([[5.0], [0.1], [7.3]])[:, None])
-    np.testing.assert_array_equal(measured.G, 0.0)
-    np.testing.assert_array_equal(measured.F, measured.R)
+    assert_array_equal(measured.G, 0.0)
+    assert_array_equal(measured.F, measured.R)
 
 
 @pytest.mark.parametrize("build", [unscented, gauss_hermite])
@@ -167,10 +173,10 @@ def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
     model = Model.define("0.9*x + v", "2*x + 1", prior={"mean": 0.3, "variance": 2.0})
     y = np.array([1.7, 0.2, -3.0])
     estimates, exact = (run(aof(filter_(model)), y) for filter_ in (build, gaussian))
-    np.testing.assert_array_equal(estimates.cov, np.zeros((3, 1, 1, 1)))
-    np.testing.assert_allclose(estimates.mean, exact.mean, rtol=1e-12)
+    assert_array_equal(estimates.cov, np.zeros((3, 1, 1, 1)))
+    assert_allclose(estimates.mean, exact.mean, rtol=1e-12)
     still = Model.define("x", "x", prior={"mean": 0, "variance": 2.0})
-    np.testing.assert_array_equal(run(aof(build(still)), np.ones(3)).cov, np.zeros((3, 1, 1, 1)))
+    assert_array_equal(run(aof(build(still)), np.ones(3)).cov, np.zeros((3, 1, 1, 1)))
     with pytest.raises(ValueError, match="no density for the measurement of step 1"):
         likelihood(aof(build(still)), np.array([1.0, 1.1]))
 
@@ -182,4 +188,4 @@ def test_a_covariance_that_rounding_has_broken_is_no_error():
     model = Model.define(["x1 + x2", "x2"], ["x1 + 1e-9*w1", "x1 + x2 + w2"], prior=prior)
     filters = aof(gauss_hermite(model)), aof(linearised(model))
     (_, points), (_, exact) = (run(each, np.zeros((6, 1, 2))) for each in filters)
-    np.testing.assert_allclose(points[-1], exact[-1], rtol=1e-5)
+    assert_allclose(points[-1], exact[-1], rtol=1e-5)

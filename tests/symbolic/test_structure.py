@@ -5,13 +5,10 @@ import oracles
 import pytest
 import scipy
 import sympy as sp
+from numpy.testing import assert_allclose
 
+from kfcourse import Model, ModelError, NoClosedForm, gauss_hermite, gaussian, linearised, unscented
 from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.quadrature import gauss_hermite, unscented
-from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
 
@@ -133,7 +130,7 @@ def test_gaussian_functions_are_what_quadrature_finds(name):
     computed = parts(gaussian(model), *model.prior)
     for (equation, _, noise), ours in zip(sides(model), computed, strict=True):
         for part, expected in zip(ours, quadrature(model, equation, noise), strict=False):
-            np.testing.assert_allclose(part, expected, rtol=1e-8, atol=1e-9)
+            assert_allclose(part, expected, rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -156,10 +153,10 @@ def test_linearised_functions_are_values_and_difference_quotients(name):
         value, spread, slope, unexplained = ours
         A = slopes(lambda at, of=function, m=m: of(at, m), x)
         B = slopes(lambda at, of=function: of(x, at), m)
-        np.testing.assert_allclose(value, function(x, m), rtol=1e-13)
-        np.testing.assert_allclose(slope, A, rtol=1e-7, atol=1e-8)
-        np.testing.assert_allclose(unexplained, B @ D @ B.T, rtol=1e-7, atol=1e-8)
-        np.testing.assert_allclose(spread, A @ P @ A.T + B @ D @ B.T, rtol=1e-7, atol=1e-8)
+        assert_allclose(value, function(x, m), rtol=1e-13)
+        assert_allclose(slope, A, rtol=1e-7, atol=1e-8)
+        assert_allclose(unexplained, B @ D @ B.T, rtol=1e-7, atol=1e-8)
+        assert_allclose(spread, A @ P @ A.T + B @ D @ B.T, rtol=1e-7, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["variant 53", "vector", "van der Pol"])
@@ -174,7 +171,7 @@ def test_gauss_hermite_is_exact_for_polynomials(name):
         parts(gauss_hermite(model, 4), *law), parts(gaussian(model), *law), strict=True
     ):
         for ours, exact in zip(computed, expected, strict=True):
-            np.testing.assert_allclose(*np.broadcast_arrays(ours, exact), rtol=1e-11, atol=1e-11)
+            assert_allclose(*np.broadcast_arrays(ours, exact), rtol=1e-11, atol=1e-11)
 
 
 @pytest.mark.parametrize("kappa", [None, 0.5, 2.0])
@@ -184,8 +181,8 @@ def test_unscented_means_are_exact_for_quadratic_functions(kappa):
     for computed, expected in zip(
         parts(numerical, *model.prior), parts(exact, *model.prior), strict=True
     ):
-        np.testing.assert_allclose(computed[0], expected[0], rtol=1e-12)
-        np.testing.assert_allclose(computed[2], expected[2], rtol=1e-12)
+        assert_allclose(computed[0], expected[0], rtol=1e-12)
+        assert_allclose(computed[2], expected[2], rtol=1e-12)
 
 
 def test_large_means_lose_no_digits():
@@ -223,8 +220,8 @@ def test_an_exponential_of_a_large_constant_is_not_torn_apart():
     )
     z, p, slope = 6400.0, 2.0, 1 + 0.1 * 0.6 / 13.406 * np.exp(-26 / 13.406)
     tau, Theta = linearised(model).predict(np.array([[z]]), np.array([[[p]]]))
-    np.testing.assert_allclose(tau, [[z - 0.1 * 0.6 * np.exp(-26 / 13.406)]], rtol=1e-13)
-    np.testing.assert_allclose(Theta, [[[slope**2 * p + 1]]], rtol=1e-12)
+    assert_allclose(tau, [[z - 0.1 * 0.6 * np.exp(-26 / 13.406)]], rtol=1e-13)
+    assert_allclose(Theta, [[[slope**2 * p + 1]]], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -267,5 +264,5 @@ def test_models_that_differ_in_a_number_only_are_not_taken_for_each_other(derive
         computed.append((structure.predict(z, p).cov, structure.measure(z, p).R))
     first, doubled, other, again = computed
     # e v with twice the e, or four times the variance
-    np.testing.assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)
+    assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)
     assert np.array_equal(first, again) and not np.allclose(first, doubled)

@@ -4,8 +4,7 @@ import pytest
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import gaussian
+from kfcourse import Model, gaussian
 from kfcourse.symbolic.typesetting import latex, with_index
 from kfcourse.symbolic.writing import _Writer, formula_latex, formula_lines, number_latex
 

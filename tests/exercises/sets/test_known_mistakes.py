@@ -9,9 +9,9 @@ import pytest
 import sympy as sp
 from weekly import WEEK
 
+from kfcourse import load_variants
 from kfcourse.exercises.checks import ExerciseError, engine, exercise, sets
 from kfcourse.exercises.checks.editing import edited
-from kfcourse.lab.variants import load_variants
 
 # Questions about the variant's model are asked for variants of all kinds.  The others are called
 # with hidden functions, numbers: two draws of them.  So are those of sets f and g, g's in the

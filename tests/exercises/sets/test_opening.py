@@ -4,7 +4,7 @@ import pytest
 import sympy as sp
 
 from kfcourse.exercises.checks import ExerciseError, exercise
-from kfcourse.lab.variants import VariantError
+from kfcourse.lab import VariantError
 
 pytestmark = pytest.mark.quick
 

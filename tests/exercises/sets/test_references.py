@@ -7,9 +7,20 @@ import control
 import numpy as np
 import pytest
 import sympy as sp
+from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from kfcourse import Model, gaussian, linearised, predictions, run, simulate
+from kfcourse import (
+    Gaussian,
+    GaussianMoments,
+    Model,
+    gaussian,
+    linearised,
+    load_variants,
+    predictions,
+    run,
+    simulate,
+)
 from kfcourse.continuous import ContinuousModel, steady_state
 from kfcourse.exercises.checks import exercise
 from kfcourse.exercises.sets.f_exact import companion
@@ -23,11 +34,9 @@ from kfcourse.exercises.sets.o_modes import keys as modes
 from kfcourse.exercises.sets.o_modes import questions as modes_questions
 from kfcourse.exercises.sets.p_find_the_slip import keys as slips
 from kfcourse.filters import alphabeta, aof, kalman_filter, logic_dynamic
-from kfcourse.lab.variants import find_variant, load_variants
-from kfcourse.laws import Gaussian
+from kfcourse.lab import find_variant
 from kfcourse.linear.consistency import innovations, nees, nis
 from kfcourse.scenarios.navigation import Dynamics, Observation, Sensor, fuse
-from kfcourse.symbolic.moments import GaussianMoments
 
 
 def test_the_grid_is_the_kalman_filter_on_a_linear_model():
@@ -45,8 +54,8 @@ def test_the_grid_is_the_kalman_filter_on_a_linear_model():
     law, before = run(kalman_filter(model), y), predictions(kalman_filter(model), y)
     # step 0.026, narrowest density 0.4: the rule's error is below rounding (formula of the
     # chapter); 8 steps of rounding
-    np.testing.assert_allclose(z, law.mean[:, 0, 0], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(p, law.cov[:, 0, 0, 0], rtol=1e-11)
+    assert_allclose(z, law.mean[:, 0, 0], rtol=0, atol=1e-12)
+    assert_allclose(p, law.cov[:, 0, 0, 0], rtol=1e-11)
     F = 1.7**2 * before.cov[:, 0, 0, 0] + 0.49
     logs = -0.5 * ((y[:, 0, 0] - 1.7 * before.mean[:, 0, 0]) ** 2 / F + np.log(2 * np.pi * F))
     assert total == pytest.approx(np.nansum(logs), abs=1e-11)
@@ -64,12 +73,10 @@ def test_the_extended_filter_is_the_package_s(name):
     ekf = aof(linearised(shifted))
     law, before = run(ekf, y), predictions(ekf, y)
     for mine, theirs in ((z, law.mean), (p, law.cov), (lam, before.mean), (Psi, before.cov)):
-        np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
+        assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
     theirs = extended.consistency(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
-    np.testing.assert_allclose(theirs[0], nees(x, law).mean(axis=1), rtol=1e-6)
-    np.testing.assert_allclose(
-        theirs[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6
-    )
+    assert_allclose(theirs[0], nees(x, law).mean(axis=1), rtol=1e-6)
+    assert_allclose(theirs[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6)
 
 
 def test_hidden_jacobians_are_derivatives():
@@ -78,7 +85,7 @@ def test_hidden_jacobians_are_derivatives():
         x = np.random.default_rng(1).normal(size=(4, n))
         for function, jacobian in ((hidden.f, hidden.Phi), (hidden.S, hidden.H)):
             # third derivatives of order one: error of the order step^2
-            np.testing.assert_allclose(extended.jacobian(function, x, 1e-4), jacobian(x), atol=1e-7)
+            assert_allclose(extended.jacobian(function, x, 1e-4), jacobian(x), atol=1e-7)
         assert np.linalg.eigvalsh(hidden.D_n(x)).min() > 0
 
 
@@ -118,7 +125,7 @@ def test_two_steps_of_modes_are_the_package_s_filter(variant):
         before = filter_.step(filter_.init(1), y[:1, None])
         after = filter_.step(before, y[1:, None])
         theirs = modes.two_steps(y, m, d, a, q, C, pi, first)
-        np.testing.assert_allclose(
+        assert_allclose(
             theirs, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12
         )
 
@@ -143,8 +150,8 @@ def test_the_alpha_beta_filter_and_its_gains_are_the_package_s():
         for run_, axis in np.ndindex(y.shape[1:]):
             start = [np.broadcast_to(part, y.shape[1:])[run_, axis] for part in (r, v)]
             expected = control.forced_response(out, U=y[:, run_, axis], X0=start).outputs
-            np.testing.assert_allclose(positions[:, run_, axis], expected[0], rtol=1e-9, atol=1e-9)
-            np.testing.assert_allclose(velocities[:, run_, axis], expected[1], rtol=1e-9, atol=1e-9)
+            assert_allclose(positions[:, run_, axis], expected[0], rtol=1e-9, atol=1e-9)
+            assert_allclose(velocities[:, run_, axis], expected[1], rtol=1e-9, atol=1e-9)
     key, calls = asked("j", "j3")
     for (alpha,) in calls:
         assert key(alpha) == pytest.approx(
@@ -164,8 +171,8 @@ def test_late_measurements_are_fused_as_by_the_package():
         vehicle = Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
         law = fuse(vehicle, [sensor], Gaussian(m, P), seen, np.array([now]))
         mean, cov = key(tags, arrivals, values, m, P, q, r, now)
-        np.testing.assert_allclose(mean, law.mean[0, 0], rtol=1e-9)
-        np.testing.assert_allclose(cov, law.cov[0, 0], rtol=1e-9)
+        assert_allclose(mean, law.mean[0, 0], rtol=1e-9)
+        assert_allclose(cov, law.cov[0, 0], rtol=1e-9)
 
 
 def test_formulas_without_a_slip_are_moments_of_the_package():
