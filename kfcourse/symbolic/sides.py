@@ -69,7 +69,7 @@ class Side:
 
 @lru_cache(maxsize=64)  # the same for all values of the parameters
 def taylor(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
-    """Value at the mean, slope A, and A cov A^T + B D B^T."""
+    """Value at the mean, slope A, A cov A^T + B D B^T, and its second part alone."""
     if any(part.has(sp.Derivative, sp.DiracDelta) for part in (side.A, side.B)) or any(
         jumps(choice, [*side.x, *side.noise]) for choice in side.equation.atoms(sp.Piecewise)
     ):
@@ -78,7 +78,8 @@ def taylor(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
             f"unscented(model) or gauss_hermite(model)",
             "no_slope",
         )
-    return side.value, side.A, side.A * side.cov * side.A.T + side.B * side.D * side.B.T
+    of_noise = side.B * side.D * side.B.T
+    return side.value, side.A, side.A * side.cov * side.A.T + of_noise, of_noise
 
 
 @lru_cache(maxsize=64)

@@ -158,6 +158,7 @@ class StructuralFormulas:
     m: sp.ImmutableMatrix
     d: sp.ImmutableMatrix
     functions: dict[str, sp.ImmutableMatrix]
+    of_noises: tuple[sp.ImmutableMatrix, ...] = ()  # Q and R, where known
 
     @property
     def state_arguments(self) -> list[sp.Symbol]:
@@ -170,6 +171,8 @@ class StructuralFormulas:
     @cached_property
     def R(self) -> sp.ImmutableMatrix:
         """F - G d G^T, the part of the measurement's covariance that the state does not explain."""
+        if self.of_noises:
+            return _expanded(self.of_noises[1])
         G, F = self.functions["G"], self.functions["F"]
         return _expanded(sp.ImmutableMatrix(F - G * self.d * G.T))
 
@@ -182,6 +185,8 @@ class StructuralFormulas:
     def Q(self) -> sp.ImmutableMatrix:
         """Theta - A p A^T, the part of the next state's covariance that this state does not
         explain."""
+        if self.of_noises:
+            return _expanded(self.of_noises[0])
         return _expanded(sp.ImmutableMatrix(self.functions["Theta"] - self.A * self.p * self.A.T))
 
     @cached_property
@@ -283,11 +288,11 @@ def _derived(
     if model.between is not None:
         return model.between.structure(model, build)
     state, meter = Side.of(model, "object"), Side.of(model, "meter")
-    (tau, _, Theta), (h, G, F) = moments_of(state), moments_of(meter)
+    (tau, _, Theta, *of_v), (h, G, F, *of_w) = moments_of(state), moments_of(meter)
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": G, "F": F}
     expanded = {key: _expanded(part, **hints) for key, part in functions.items()}
     laws = state.mean, state.cov, meter.mean, meter.cov
-    return StructuralFormulas(model, name, *laws, expanded).structure()
+    return StructuralFormulas(model, name, *laws, expanded, (*of_v, *of_w)).structure()
 
 
 @lru_cache(maxsize=256)  # modes often have the same object, or the same meter, with other numbers
