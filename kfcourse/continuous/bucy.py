@@ -5,18 +5,16 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from kfcourse.continuous.equations import filter_equations, symmetrised_drift, without_noise
+from kfcourse.continuous.equations import filter_equations, without_noise
 from kfcourse.continuous.model import ContinuousModel, compiled, to_discrete
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, Measurement, correct, product, symmetric, transpose
 from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.symbolic.reading import (
-    exact_matrix,
-)
+from kfcourse.symbolic.reading import exact_matrix
 
 
 def extended_kalman_bucy(
-    model: ContinuousModel, step: float, second_derivatives: bool = False, symmetrised: bool = False
+    model: ContinuousModel, step: float, second_derivatives: bool = False
 ) -> Filter:
     """The extended Kalman filter in continuous time, as a filter of the means y_k over steps of
     length T.
@@ -43,8 +41,6 @@ def extended_kalman_bucy(
         T, the interval over which every y_k is the mean of y(t).
     second_derivatives : bool
         Keep the term D W D with the second derivatives of S.
-    symmetrised : bool
-        Read the equations in the symmetrised (Stratonovich) sense.
 
     Returns
     -------
@@ -56,10 +52,10 @@ def extended_kalman_bucy(
     Raises
     ------
     NotFinite
-        While running: an estimate became infinite, or, with `symmetrised`, a covariance negative.
+        While running: an estimate became infinite.
     """
     discrete = to_discrete(model, step)
-    name = "kalman-bucy" + "-second" * second_derivatives + "-symmetrised" * symmetrised
+    name = "kalman-bucy" + "-second" * second_derivatives
     equations = filter_equations(model, second_derivatives)
     z, D, y = equations.z, equations.D, equations.y
     parts = [list(equations.f), equations.A, equations.Q, list(equations.S), equations.H]
@@ -71,16 +67,7 @@ def extended_kalman_bucy(
         (intensity[i, j] * a * D * b for i, a in enumerate(slopes) for j, b in enumerate(slopes)),
         sp.zeros(*D.shape),
     )
-    added = sp.zeros(len(equations.state), 1)
-    if symmetrised:
-        added = symmetrised_drift(equations.rates, equations.state, list(y), intensity)
-    by_state = dict(zip(equations.state, added, strict=True))
-    outputs = [W, V, [by_state[component] for component in z], D.applyfunc(by_state.get)]
-    second = (
-        compiled(model, [list(z), D, list(y)], outputs)
-        if second_derivatives or symmetrised
-        else None
-    )
+    second = compiled(model, [list(z), D, list(y)], [W, V]) if second_derivatives else None
     identity, R = np.eye(model.n), model.noise_density / (2 * step)
 
     def step_forward(state: State, y: Array) -> State:
@@ -94,13 +81,12 @@ def extended_kalman_bucy(
             M, cov = identity, B
             if second is not None:
                 missing: Array = np.asarray(np.isnan(y).any(axis=-1))
-                W, V, dz, dD = second(t, z, B, np.where(missing[:, None], 0.0, y))
-                W, V, dD = (np.where(missing[:, None, None], 0.0, matrix) for matrix in (W, V, dD))
+                W, V = second(t, z, B, np.where(missing[:, None], 0.0, y))
+                W, V = (np.where(missing[:, None, None], 0.0, matrix) for matrix in (W, V))
                 M = _solve(identity + step / 8 * product(B, V), identity + step / 2 * product(B, W))
-                mean, Q = mean + step * np.where(missing[:, None], 0.0, dz), Q + dD
-                cov = _propagated(M, B, step * dD)
+                cov = _propagated(M, B, 0.0)
             predicted = Gaussian(mean + step * f, _propagated(M + step * A, B, step * Q))
-        _check_law(name, state.step, step, predicted, symmetrised)
+        _check_law(name, state.step, step, predicted)
         return State(state.step + 1, Gaussian(mean, cov), predicted)
 
     return Filter(name, discrete, initial_state(discrete), step_forward)
@@ -110,19 +96,16 @@ def _solve(left: Array, right: Array) -> Array:
     return right / left if left.shape[-1] == 1 else np.linalg.solve(left, right)
 
 
-def _propagated(M: Array, cov: Array, added: Array) -> Array:
+def _propagated(M: Array, cov: Array, added: Array | float) -> Array:
     """M cov M^T + added."""
     return symmetric(product(product(M, cov), transpose(M)) + added)
 
 
-def _check_law(name: str, k: int, step: float, law: Gaussian, may_be_negative: bool) -> None:
+def _check_law(name: str, k: int, step: float, law: Gaussian) -> None:
     lost = ~np.asarray(np.isfinite(law.mean).all(axis=-1) & np.isfinite(law.cov).all(axis=(-2, -1)))
-    if may_be_negative and not lost.any():
-        lost = np.asarray(np.linalg.eigvalsh(law.cov).min(axis=-1) < 0)
     if lost.any():
         raise NotFinite(
-            f"step {k}, time {(k + 1) * step:g}: {name} became "
-            f"infinite{' or negative' if may_be_negative else ''} in "
+            f"step {k}, time {(k + 1) * step:g}: {name} became infinite in "
             f"{np.count_nonzero(lost)} of {len(law.mean)} runs; take a smaller step than {step:g}"
             + (
                 ", and if that does not help, leave out the second derivatives"

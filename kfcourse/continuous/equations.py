@@ -8,9 +8,7 @@ from typing import NamedTuple
 import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel, numbered
-from kfcourse.symbolic.reading import (
-    exact_matrix,
-)
+from kfcourse.symbolic.reading import exact_matrix
 
 
 def log_likelihood_rate(
@@ -71,21 +69,6 @@ class FilterEquations(NamedTuple):
     F: sp.Expr
     u: sp.ImmutableMatrix
     U: sp.ImmutableMatrix
-
-    @property
-    def state(self) -> list[sp.Symbol]:
-        """z, and D row by row from its diagonal on."""
-        return [*self.z, *upper_triangle(self.D)]
-
-    @property
-    def rates(self) -> sp.ImmutableMatrix:
-        """dz/dt and dD/dt, in the order of `state`."""
-        dD = self.A * self.D + self.D * self.A.T + self.Q + self.D * self.U * self.D
-        return sp.ImmutableMatrix([*(self.f + self.D * self.u), *upper_triangle(dD)])
-
-
-def upper_triangle(matrix: sp.MatrixBase) -> list[sp.Expr]:
-    return [matrix[i, j] for i in range(matrix.rows) for j in range(i, matrix.cols)]
 
 
 def filter_equations(model: ContinuousModel, second_derivatives: bool = True) -> FilterEquations:

@@ -74,16 +74,6 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
     return ScalarFormulas(mean[0], sp.sqrt(variance[0]), meter[0], sp.sqrt(meter_variance[0]))
 
 
-def transition(model: Model) -> Callable[..., Gaussian]:
-    """x (..., n), and the step if the model has one -> law of the next state; ModelError if there
-    is none."""
-    law = _compiled(
-        model,
-        _law(model, "object", model.difference_equation("a density"), model.v, model.state_noise),
-    )
-    return lambda x, k=None: Gaussian(*law.at(k)(x))
-
-
 def likelihood(model: Model) -> LogLikelihood:
     """(y (..., p), x (..., n)) -> log p(y | x) (...); what of y is missing (NaN) does not enter, 0
     where all is.

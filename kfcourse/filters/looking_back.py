@@ -2,7 +2,7 @@ r"""Looking back from the states that a filter has left: what the whole record t
 
 A filter whose laws are normal takes the step of Rauch, Tung and Striebel (1965;
 `kfcourse.linear.smoothing`), with Cov(x_k, x_{k+1}) = p A^T from its structural functions; the
-exact filter and particles have ways of their own, `Filter.look_back`.
+exact filter has a way of its own, `Filter.look_back`.
 """
 
 from __future__ import annotations

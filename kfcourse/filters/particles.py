@@ -27,15 +27,13 @@ independently, so that
 without any contribution of the sampling: that is how particles bound other filters where `exact`
 does not reach.
 
-Looking back is backward sampling (Godsill, Doucet and West, 2004): of a state x~ drawn from
-p(x_{k+1} | Y), the particle x^j of step k, resampled, is the ancestor with a probability in
-proportion to p(x~ | x^j). Gordon, Salmond and Smith (1993); Doucet, Godsill and Andrieu (2000).
+Gordon, Salmond and Smith (1993); Doucet, Godsill and Andrieu (2000).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -45,7 +43,7 @@ from scipy.special import gammaln
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, drawn_from_memory, initial_state
-from kfcourse.filters.densities import likelihood, transition
+from kfcourse.filters.densities import likelihood
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -73,8 +71,6 @@ PRIOR = 0.1  # share drawn from N(0, I) and of modes drawn by pi, for what a nor
 # of the search for the modes of x_0, in standard deviations
 STARTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 LARGEST = 1e150  # the squares of larger states are infinite
-PATHS = 200  # that each cloud draws when it looks back
-ELEMENTS = 2**21  # of the largest array, 16 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,9 +165,8 @@ def particle(
     jumping = model if isinstance(model, JumpModel) else None
     modes = model.modes if isinstance(model, JumpModel) else (model,)
     sampler = Sampler([*map(Mode.of, modes)], jumping, particles // 2, seed, guided)
-    back = sampler.look_back if jumping is None else None
     return Filter(
-        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, look_back=back,
+        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence,
         drawn=drawn_from_memory,
     )  # fmt: skip
 
@@ -263,8 +258,9 @@ class Sampler:
             x = np.take_along_axis(x, kept[..., None], axis=2)
             mode = np.take_along_axis(mode, kept, axis=2)
             predicted = self.ahead(rng, x, mode, k)
+        effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         memory = Clouds(
-            np.moveaxis(law.mean, 1, 0), _effective(weights), log_mean.T, x, mode,
+            np.moveaxis(law.mean, 1, 0), effective, log_mean.T, x, mode,
             np.stack(counts, axis=-1), memory.part,
         )  # fmt: skip
         return State(k + 1, _of_both(*law, self.angles), predicted, memory)
@@ -277,26 +273,6 @@ class Sampler:
         moved = np.choose(_chosen(rng, self.chances(x, mode, k))[..., None], moves)
         equal = np.full(mode.shape, 1 / self.size)
         return _of_both(*weighted(moved, equal, self.angles), self.angles)
-
-    def look_back(self, states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        memories, law = [state.memory for state in states], transition(self.modes[0].model)
-
-        def back(end: int) -> Iterator[State]:
-            rng = memories[0].generator(self.seed, end)
-            clouds = [memory.x for memory in memories[:end]]
-            backwards = _backwards(rng, clouds, law, self.angles)
-            for step, (of_clouds, weights) in zip(range(end, 0, -1), backwards, strict=True):
-                both, halves = _of_both(*of_clouds, self.angles), np.moveaxis(of_clouds.mean, 1, 0)
-                effective = _effective(weights)
-                memory = replace(memories[step - 1], x=None, halves=halves, effective=effective)
-                yield State(step, both, both, memory)
-
-        return back
-
-
-def _effective(weights: Array) -> Array:
-    """How many particles of both clouds count, (runs,)."""
-    return (1 / (weights**2).sum(axis=-1)).sum(axis=1)
 
 
 class Mode(NamedTuple):
@@ -449,50 +425,3 @@ def _of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:
     return Gaussian(
         on_circle(mean[:, 1] + half, angles), cov.mean(axis=1) + half[:, :, None] * half[:, None, :]
     )
-
-
-def _backwards(
-    rng: np.random.Generator,
-    clouds: Sequence[Array],
-    law: Callable[[Array, int], Gaussian],
-    angles: Components,
-) -> Iterator[tuple[Gaussian, Array]]:
-    """From the last step to the first: laws (runs, 2, n) of both clouds, and weights of their
-    particles.
-
-    Means are taken over all particles by their probabilities of being an ancestor, before one of
-    them is drawn. ModelError where the next state has no density, as fewer noises than states enter
-    the object.
-    """
-    size = clouds[-1].shape[2]
-    paths = min(size, PATHS)
-    weights = np.full(clouds[-1].shape[:3], 1.0 / size)
-    yield weighted(clouds[-1], weights, angles), weights
-    after = clouds[-1][:, :, np.arange(paths) * size // paths]
-    for k in reversed(range(len(clouds) - 1)):
-        x, drawn = clouds[k], np.empty_like(after)
-        weights, chunk = np.empty(x.shape[:3]), max(1, ELEMENTS // (2 * paths * x[0, 0].size))
-        for rows in (slice(start, start + chunk) for start in range(0, len(x), chunk)):
-            shares = _ancestors(after[rows], *law(x[rows], k), angles)
-            weights[rows] = shares.mean(axis=2)
-            drawn[rows] = np.take_along_axis(x[rows], _chosen(rng, shares)[..., None], axis=2)
-        yield weighted(x, weights, angles), weights
-        after = drawn
-
-
-def _ancestors(after: Array, mean: Array, cov: Array, angles: Components) -> Array:
-    """Probabilities (runs, 2, paths, M) that particles, whose next states have these laws, are
-    ancestors of `after`."""
-    try:
-        root = np.linalg.cholesky(cov)
-    except np.linalg.LinAlgError:
-        raise ModelError(
-            "particles look back by the density of the next state, and it has none: fewer noises "
-            "than states enter the object; "
-            "give each state a noise, however small, or smooth with a filter of normal laws"
-        ) from None
-    root = np.broadcast_to(root, (*mean.shape, mean.shape[-1]))[:, :, None]
-    apart = difference(after[:, :, :, None], mean[:, :, None], angles)
-    logs = -0.5 * (apply(np.linalg.inv(root), apart) ** 2).sum(axis=-1)
-    with np.errstate(divide="ignore"):
-        return _normalised(logs - np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1))[0]

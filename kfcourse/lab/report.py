@@ -207,7 +207,7 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
     """What those of the filters compared that carry probabilities of modes know of them; None of a
     model without modes.
 
-    The exact filter tells only if it came through as many trajectories in its time.
+    A filter that cannot go on tells nothing.
     """
     model = result.model
     if not isinstance(model, JumpModel):

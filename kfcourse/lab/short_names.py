@@ -304,9 +304,12 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
 
 def judging(model: Model | JumpModel) -> Structure:
     """The structural functions by which predictions of measurements are judged: the best ones,
-    averaged over modes."""
+    averaged over modes.  Those of the first mode where modes have no such average: no filter can be
+    had then that needs it."""
     structures = Structures.of(model)
-    return structures.averaged if structures.jumps else structures.best
+    if not isinstance(model, JumpModel):
+        return structures.best
+    return structures.best[0] if model.by_state else structures.averaged
 
 
 def exact(model: Model | JumpModel) -> Filter:

@@ -1,10 +1,9 @@
-"""Linear systems given by matrices: the Kalman filter in five arithmetic forms, and tests of
+"""Linear systems given by matrices: the Kalman filter in four arithmetic forms, and tests of
 consistency.
 
 system        `LinearSystem`: A, H, Q, R, B, checked
-arithmetic    one correction and prediction in five forms: textbook, symmetrised, Joseph, square
-              root, UD
-factored      the UD form: factors of the covariance instead of it
+arithmetic    one correction and prediction in four forms: textbook, symmetrised, Joseph, square
+              root
 runs          the filter along stored measurements; simulation
 smoothing     the same looked back upon: Rauch, Tung and Striebel's backward pass, which every
               smoother shares

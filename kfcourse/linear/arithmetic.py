@@ -1,6 +1,6 @@
-"""One Kalman filter in five arithmetic forms.
+"""One Kalman filter in four arithmetic forms.
 
-All five are the same filter on paper.  They differ in what rounding does to the covariance:
+All four are the same filter on paper.  They differ in what rounding does to the covariance:
 
     `covariance`   P = (I - K H) P^-                          as in the textbook; may turn
                    asymmetric or negative
@@ -8,7 +8,6 @@ All five are the same filter on paper.  They differ in what rounding does to the
     `joseph`       P = (I - K H) P^- (I - K H)^T + K R K^T    a sum of non-negative terms
     `square-root`  S with P = S S^T, by orthogonal transformations; P is never formed.  R must be
                    positive definite
-    `ud`           U, D with P = U D U^T, without square roots; see `factored`
 """
 
 from __future__ import annotations
@@ -32,7 +31,6 @@ from kfcourse.laws import (
     transpose,
     without_missing,
 )
-from kfcourse.linear.factored import Factors, correct_factors, factors, predict_factors, product
 from kfcourse.linear.system import LinearSystem
 
 
@@ -45,7 +43,7 @@ class Root(NamedTuple):
 
 
 class Form(NamedTuple):
-    """One arithmetic of the Kalman filter; S is a Gaussian, a Root, or Factors.
+    """One arithmetic of the Kalman filter; S is a Gaussian or a Root.
 
     Attributes
     ----------
@@ -167,10 +165,6 @@ def _forward(lower: Array, right: Array) -> Array:
     return x
 
 
-def _correct_factors(system: LinearSystem, law: Factors, y: Vectors) -> Factors:
-    return correct_factors(law, *_measured(system, y - apply(system.H, law.mean)))
-
-
 FORMS: dict[str, Form] = {
     "covariance": Form(lambda law: law, predict_law, _correct_textbook, lambda law: law),
     "symmetrised": Form(lambda law: law, _predict_symmetric, _correct_symmetrised, lambda law: law),
@@ -180,12 +174,6 @@ FORMS: dict[str, Form] = {
         _predict_root,
         _correct_root,
         lambda law: Gaussian(law.mean, law.root @ transpose(law.root)),
-    ),
-    "ud": Form(
-        lambda law: Factors(law.mean, *factors(law.cov)),
-        lambda system, law, shift: predict_factors(system.A, law, shift, system.Q),
-        _correct_factors,
-        lambda law: Gaussian(law.mean, product(law.unit, law.diagonal)),
     ),
 }
 

@@ -51,7 +51,7 @@ def run(
         NaN where a measurement, or a component of it, is missing.
     u : ndarray (steps, runs, m) or (steps, 1, m), optional
         Known input; u[k] acts between y[k] and y[k+1].
-    arithmetic : {"joseph", "covariance", "symmetrised", "square-root", "ud"}
+    arithmetic : {"joseph", "covariance", "symmetrised", "square-root"}
         All of it runs in the precision of the system's matrices, but for the gain from p > 1
         measurements at once: NumPy solves float32 equations in double and rounds the solution.
 

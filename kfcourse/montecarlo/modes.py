@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import NotFinite, Refused
 from kfcourse.filters.base import Filter
 from kfcourse.filters.designed import Design
 from kfcourse.laws import Array
@@ -46,8 +47,8 @@ class Recognised(NamedTuple):
 def recognised(
     filters: Sequence[Filter | Design], model: JumpModel, runs: int, steps: int, seed: int
 ) -> Recognised:
-    """Run those of the filters that carry probabilities of modes on common trajectories; slow ones
-    on an eighth of them.
+    """Run those of the filters that carry probabilities of modes on common trajectories, slow ones
+    on an eighth of them; without one that cannot go on.
 
     The standard errors are those of means over independent trajectories.
     """
@@ -60,7 +61,10 @@ def recognised(
             continue
         size = least if filter_.slow else runs
         after = islice(walk(filter_, y[:, :size]), 1, None)
-        chances = np.stack([state.memory.probability for state in after])  # (steps, size, J)
+        try:
+            chances = np.stack([state.memory.probability for state in after])  # (steps, size, J)
+        except (Refused, NotFinite):
+            continue
         right = (chances.argmax(axis=2) == mode[:, :size]).mean(axis=0)
         share[filter_.name] = Estimate(right.mean(), right.std(ddof=1) / np.sqrt(size), size - 1)
         there[filter_.name] = chances[:, shown]

@@ -12,7 +12,7 @@ smoother of Rauch, Tung and Striebel (`kfcourse.linear.smoothing`) is at the sam
 the unscented, the quadrature and the normal one.
 
 What none of them can beat is the mean of the density itself: the exact filter looks back on its
-nodes, and particles along their ancestors drawn anew (`kfcourse.filters.exact`, `particles`).
+nodes (`kfcourse.filters.exact`).
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ def smooth(filter_: Filter, y: Array, lag: int | None = None) -> Gaussian:
     ----------
     filter_ : Filter
         Whose laws are normal: `aof`, `iterated`, `kalman_filter`; `pointmass`, which looks back
-        exactly; `particle`.
+        exactly.
     y : ndarray (steps, runs, p)
         As for `run`; NaN where a measurement, or a component of it, is missing.
     lag : int, optional
         Use the measurements up to so many steps later only (fixed lag): what is known with that
-        delay.  Of the exact filter and of particles that costs `lag` + 1 times as much as the whole
-        record, as each step is looked back to for itself.
+        delay.  Of the exact filter that costs `lag` + 1 times as much as the whole record, as each
+        step is looked back to for itself.
 
     Returns
     -------
@@ -87,17 +87,8 @@ def smooth(filter_: Filter, y: Array, lag: int | None = None) -> Gaussian:
 
 
 def smoothing_error(filter_: Filter, y: Array, lag: int | None = None) -> Array:
-    """How far the estimates of `smooth` may be from the true means given the record, (steps, runs),
-    in the units of x.
-
-    Of the exact filter the estimated error of its integrals; of particles the standard error, by
-    the distance of two clouds that know nothing of each other.  It is right to a tenth where tens
-    of particles count at every step (`state.memory.effective`), as they do where the proposal looks
-    at the measurement.  Where fewer do, as with `guided=False` at a far measurement, both clouds
-    miss the same states: there it is a third too small.  Of two clouds it has one degree of
-    freedom: an interval of 95 % reaches 12.7 standard errors (Student), not 2.  Over 400
-    trajectories of each kind, 400 particles, such intervals held the exact smoother's components in
-    .95 of the cases, and in .91 where fewer than 20 particles counted.  Arguments as of `smooth`.
+    """How far the exact filter's estimates of `smooth` may be from the true means given the record,
+    (steps, runs), in the units of x.  Arguments as of `smooth`.
 
     Raises
     ------

@@ -31,6 +31,7 @@ from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, 
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Instant
+from kfcourse.montecarlo.experiment import walk
 from kfcourse.symbolic.averaging import averaged
 from kfcourse.symbolic.jumping import JumpModel
 
@@ -39,6 +40,11 @@ pytestmark = pytest.mark.quick
 ROUNDING = 1e-10
 SEQUENTIAL = [imm, logic_dynamic, gpb2]
 SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10.0}}}
+LONG_FAULT = (  # what a sensor measured that sooner or later was faulty
+    "3.9 4.3 5.6 3.2 5.1 3.5 1.6 3 4 -3.6 9.9 -5 -4.5 1.9 -31.8 -9.1 3.3 -10.2 -1.1 -10.7 8.6 2.6 "
+    "9.3 3.5 8.7 -19.9 -5.3 15.6 5.4 3.5 20.2 -5.8 10.1 18 14 4.5 -17.9 -10.6 8 -1.7 11.2 15.6 "
+    "10.2 11.3 6.9 -7.4 3.8 -2.8 14.3 15.4 22.5"
+)
 LASTING, FIRST = [[0.9, 0.1], [0.3, 0.7]], [0.8, 0.2]
 
 
@@ -99,6 +105,30 @@ def test_the_exact_filter_is_the_sum_over_all_histories(model):
             assert abs(cov[k, trajectory] / variance - 1) < 2e-3
             assert_allclose(probability[k, trajectory], expected, atol=1e-3)
         assert abs(total[trajectory] - evidence) < 6e-3
+
+
+def test_a_long_fault_leaves_the_exact_filter_sure_of_itself():
+    """What panels lack lies at their ends, not where modes that hardly anybody believes have led.
+
+    Measured as if it lay there, the loss grew with each measurement of this fault, until the last
+    one had no posterior: the lab's comparison of this variant had no bound.  The reference are both
+    densities on 1,801 points, .05 apart, where the object's noise has the deviation .7.
+    """
+    model = find_variant("J1-lasting").model
+    y = np.array(LONG_FAULT.split(), dtype=float)
+    x = np.linspace(-40, 50, 1801)
+    kernel, (mean, cov) = norm.pdf(x[:, None], 0.9 * x, 0.5**0.5), model.prior
+    density = model.first[:, None] * norm.pdf(x, mean[0], cov[0, 0] ** 0.5)
+    for measured, state in zip(y, list(walk(pointmass(model), y[:, None, None]))[1:], strict=True):
+        density *= [norm.pdf(measured, x, deviation) for deviation in (1, 10)]
+        density /= density.sum()
+        expected = (density @ x).sum()
+        sd = (density @ (x - expected) ** 2).sum() ** 0.5
+        (error,) = state.memory.error
+        assert error < 0.01
+        assert abs(state.posterior.mean[0, 0] - expected) < error * sd
+        assert abs(state.posterior.cov[0, 0, 0] ** 0.5 / sd - 1) < error
+        density = model.transition_at(0).T @ density @ kernel.T
 
 
 # --- filters of one law for each mode

@@ -4,18 +4,19 @@ knows modes."""
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import JumpModel, cli, load_variants, simulate
+from kfcourse import JumpModel, NotFinite, cli, compare, load_variants, simulate
 from kfcourse.exercises.notebooks import handing_out
 from kfcourse.exercises.notebooks.jobs import Outcome
-from kfcourse.filters import logic_dynamic, particle, pointmass
+from kfcourse.filters import imm, logic_dynamic, particle, pointmass
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import JUMP_LAB, Structures, title
+from kfcourse.lab.short_names import JUMP_LAB, Structures, judging, title
 from kfcourse.lab.variants import (
     VariantError,
     chosen_variants,
@@ -207,6 +208,37 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
     assert outcome.probability[filter_.name].shape == (8, 2)
     # particles are slow
     assert [filter_.freedom + 1 for filter_ in outcome.share.values()] == [160, 160, 20]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*load_variants(), *JUMPS])
+def test_the_lab_takes_every_variant_that_is_shipped(name, tmp_path):
+    sizes = ["--runs", "40", "--steps", "4", "--jobs", "1"]
+    options = ["--scores", "--out", str(tmp_path / "report")]
+    result = CliRunner().invoke(cli.main, ["lab", name, *sizes, *options])
+    assert result.exit_code == 0, result.output
+    assert "exact AOF left out" not in result.output
+    assert (tmp_path / "report" / "report.html").exists()
+
+
+def test_predictions_are_judged_where_transitions_depend_on_the_state():
+    model = JUMPS["J1-overload"].model
+    filter_ = imm(Structures(model).gaussian, model)
+    result = compare([filter_], model, 20, 3, 1, scores=judging(model), progress=False)
+    assert np.isfinite(result.log_score(filter_.name).value).all()
+
+
+def test_a_filter_that_cannot_go_on_has_no_share():
+    model = JUMPS["J1-lasting"].model
+    steady = imm(Structures(model).gaussian, model.transition_at, model.first)
+
+    def step(state, y):
+        if state.step == 3:
+            raise NotFinite("step 3")
+        return steady.step(state, y)
+
+    stopped = replace(steady, name="stopped", step=step)
+    assert [*recognised([stopped, steady], model, 20, 5, 1).share] == [steady.name]
 
 
 def test_the_chapter_shows_the_shipped_table():

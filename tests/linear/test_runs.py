@@ -1,4 +1,4 @@
-"""The linear Kalman filter in five arithmetic forms, covariance analysis and steady state, against
+"""The linear Kalman filter in four arithmetic forms, covariance analysis and steady state, against
 independent references."""
 
 import control
@@ -133,26 +133,14 @@ def lost(mean, right, since=0):
     return (abs(mean - right.mean)[since:] > 3 * sd[since:]).any(axis=(0, 2)).mean()
 
 
-@pytest.mark.parametrize("arithmetic", ["square-root", "ud"])
-def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned):
+def test_short_words_do_not_break_the_square_root(ill_conditioned):
     short, prior, y, right = ill_conditioned
-    laws = run(short, prior, y, arithmetic=arithmetic).posterior
+    laws = run(short, prior, y, arithmetic="square-root").posterior
     assert lost(laws.mean, right) == 0
     # The condition number of the root is 1e6: with rounding of 6e-8 and 40 steps, below 0.3 for all
     # 300 starts.
     assert_allclose(laws.cov[5:], right.cov[5:], rtol=0.3, atol=0.3 * abs(right.cov[5:]).max())
     assert (np.diagonal(laws.cov, axis1=-2, axis2=-1) >= 0).all()
-
-
-# ---------------------------------------------------------------- the pieces of the UD form
-
-
-def test_the_ud_form_takes_a_meter_without_noise():
-    silent = LinearSystem(**(GOOD | {"R": np.zeros((1, 1)), "Q": np.zeros((2, 2))}))
-    # the same measurement three times
-    laws = run(silent, GOOD_PRIOR, np.ones((3, 1, 1)), arithmetic="ud").posterior
-    assert_allclose(laws.mean[:, 0], 0.5, rtol=1e-14)
-    assert_allclose(laws.cov[:, 0], [[[0.5, -0.5], [-0.5, 0.5]]] * 3, rtol=1e-14)
 
 
 # ---------------------------------------------------------------- errors

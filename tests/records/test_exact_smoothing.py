@@ -1,5 +1,5 @@
-"""Looking back exactly, and with particles: linear models, brute force over whole trajectories, and
-the errors that both tell."""
+"""Looking back exactly: linear models, brute force over whole trajectories, and the error that is
+stated."""
 
 import itertools
 
@@ -8,11 +8,10 @@ import pytest
 import sympy as sp
 
 from kfcourse import Model, compare, gaussian, linearised, run, simulate, smooth
-from kfcourse.filters import aof, kalman_filter, particle, pointmass
+from kfcourse.filters import aof, kalman_filter, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
 from kfcourse.lab.variants import find_variant
 from kfcourse.records import smoothing_error
-from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
 
@@ -142,40 +141,6 @@ def test_with_a_lag_it_is_the_posterior_of_a_shorter_record(lag):
     later = smooth(filter_, y).mean
     assert np.abs(smoothed.mean - later)[0].min() > 0.01
     np.testing.assert_array_equal(smoothed.mean[3 - lag :], later[3 - lag :])
-
-
-@pytest.fixture(scope="module")
-def plane() -> Model:
-    return Model.define(["x1 + 0.3*x2 + 0.1*v1", "0.9*x2 + 0.3*v2 + 0.1*v1"], ["x1 + 0.5*w"])
-
-
-@pytest.mark.slow
-def test_particles_look_back_as_well_as_they_say(plane):
-    y = simulate(plane, 60, 10, seed=1).y.copy()
-    y[4, :9] = np.nan
-    expected = smooth(kalman_filter(plane), y)
-    filter_ = particle(plane, 1000, seed=1)
-    smoothed, error = smooth(filter_, y), smoothing_error(filter_, y)
-    away = np.linalg.norm(smoothed.mean - expected.mean, axis=-1)
-    # 600 distances, half of them those of two clouds: root mean squares good to some 5 %, steps
-    # dependent
-    assert np.sqrt(np.mean(away**2)) == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.2)
-    assert np.sqrt(np.mean(away[:-1] ** 2)) < 0.3 * np.sqrt(
-        np.mean((run(filter_, y).mean - smoothed.mean)[:-1] ** 2)
-    )
-    ratio = (
-        np.trace(smoothed.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)
-    ).mean(axis=1)
-    # 60 covariances of 1,000 particles, of which a few hundred count
-    assert np.abs(ratio - 1).max() < 0.08
-
-
-def test_an_object_without_noise_of_its_own_has_no_density_to_look_back_by():
-    model = Model.define(["x1 + x2", "x2 + v"], ["x1 + w"])
-    with pytest.raises(
-        ModelError, match="particles look back by the density of the next state, and it has none"
-    ):
-        smooth(particle(model, 20), np.zeros((3, 1, 1)))
 
 
 # ---------------------------------------------------------------- comparison

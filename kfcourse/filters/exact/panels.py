@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.polynomial import Chebyshev, Polynomial, legendre
+from numpy.polynomial import Chebyshev, Polynomial, hermite_e, legendre
 
 from kfcourse.filters.exact.columns import (
     ERROR,
@@ -64,7 +64,6 @@ JUMP = 2.0  # of the residual between two points, beyond which a hump may be hid
 LEFT_OUT = 1e-11  # mass of a density that its panels may lack
 FAINT = 30.0  # below the highest log-likelihood that humps are sought: 1e-13 of it
 NOTHING = 46.0  # below the highest log-density where no panel is looked at: 1e-20 of it
-TAIL = 20.0  # below a bound of a prediction's density where its tails begin
 IMPOSSIBLE = 9.0  # deviations of the meter's noise that no record of the model has: 1e-19
 GOES_ON = 23.0  # below the highest log-density where a density has not ended: 1e-10 of it
 CURVED = 0.1  # times the square of the last coefficients of a density, a bound of the rule's error
@@ -90,6 +89,10 @@ POWER = np.array([legendre.leg2poly(column) for column in COEFFICIENT.T]).T.copy
 SLOPE = np.array(
     [legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T]
 ).T.copy()
+
+# of a normal law, and what they weigh
+NODE, NODE_WEIGHT = hermite_e.hermegauss(Q)
+NODE_WEIGHT /= NODE_WEIGHT.sum()
 
 EXP2 = tuple(Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial).coef.tolist())
 LN2, SHIFT = np.log(2), 1.5 * 2.0**52
@@ -432,22 +435,24 @@ def sorted_rows(P, n, whole):
 
 
 @njit(**INNER)
-def grown(P, n, height, whole):
-    """Factor by which a measurement changes the mass in the prediction's tails: p(y | tails) /
-    p(y).
+def seen_beyond(earlier, model, B, y, room):
+    """p(y) of what a posterior's panels B have lost, if all of it lay at both of their ends.
 
-    What panels have lost lies there.  It grows where measurements lead to where the state was never
-    thought to be, by and by or at once: so a record that contradicts the model is known.
+    So a record that contradicts the model is known: measurements lead to where the state was never
+    thought to be, by and by or at once, and what is lost grows with each.  Of records as the model
+    makes them it does not grow, in the mean.
     """
-    mass, seen, top = 0.0, 0.0, log(height)
-    for p in range(n):
-        for i in range(Q if P[p, MASS] > 0 else 0):
-            before = P[p, i] - P[p, LIKELY + i] - top
-            if before < -TAIL:
-                share = WEIGHT[i] * (P[p, RIGHT] - P[p, LEFT]) * density(before)
-                mass += share
-                seen += share * density(min(P[p, LIKELY + i] - whole, 100.0))
-    return seen / mass if mass > 0 else 0.0
+    x, z, q, near, _ = room.point
+    density_of_y = 0.0
+    for place in (B[0, LEFT], B[len(B) - 1, RIGHT]):
+        x[:] = place
+        earlier.law(earlier.moves, Q, 0.0, earlier.constants, x, z, q)
+        for i in range(Q):
+            x[i] = z[i] + q[i] * NODE[i]
+        residual(model, model.meter, y, 0.0, room.point)
+        for i in range(Q):
+            density_of_y += 0.5 * NODE_WEIGHT[i] * density(q[i] - 0.5 * near[i] * near[i])
+    return density_of_y
 
 
 @njit(**INNER)
@@ -466,8 +471,10 @@ def lacking(room, groups, place, top):
 
 
 @njit(**INNER)
-def corrected(model, room, y, n, total, later, accuracy, first, expected, numbers):
+def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
     """The posterior from the n first panels: how it ended, and how many are left, in order.
+
+    The prediction lacks a mass `lost`, and with it `beyond` of the density of y.
 
     numbers: mean, variance, ln p(y | the past), estimated error of mean and deviation in
     deviations.
@@ -528,14 +535,9 @@ def corrected(model, room, y, n, total, later, accuracy, first, expected, number
     if not variance > 1e-300:
         return EMPTY, 0
     error += 1.0 if P[likeliest, FIT] > IMPOSSIBLE else 0.0
-    if not first:
-        lost = numbers[LOST] + LEFT_OUT
-        numbers[LOST] = lost * expected * grown(P, n, total.height, whole)
-        error += (
-            lost * lacking(room, total.groups, origin, top)
-            + REACH * REACH * numbers[LOST]
-            + total.rough
-        )
+    numbers[LOST] = exp(min(log(beyond) - whole, 100.0)) if beyond > 0 else 0.0
+    error += lost * lacking(room, total.groups, origin, top) + REACH * REACH * numbers[LOST]
+    error += total.rough
     numbers[MEAN], numbers[VARIANCE] = origin + mean, variance
     numbers[EVIDENCE], numbers[ERROR] = whole, error
     return FINE, sorted_rows(P, n, whole)
@@ -865,9 +867,7 @@ def advance(
     for t in range(T):
         start = t * modes
         here = numbers[start : start + modes]
-        known, later_count, lost = here.copy(), 0, 0.0
-        for j in range(modes):
-            lost += known[j, PROBABILITY] * known[j, LOST]
+        known, later_count = here.copy(), 0
         for j in range(modes):
             moves = 2 * modes if first else 2 * j
             earlier = Setting(law, moves, 2 * j + 1, constants[1], turns)
@@ -880,8 +880,16 @@ def advance(
                 rows = later[later_begin[t] : later_begin[t + 1]]
                 later_count = sources(rows, least_deviation(model, room, n), room)
                 status = status if later_count or not len(rows) else KERNELLED
-            kept, here[j, EVIDENCE], here[j, LOST] = 0, -np.inf, lost
+            kept, here[j, EVIDENCE] = 0, -np.inf
             if status == FINE and n:
+                lost = beyond = 0.0
+                for i in range(0 if first else modes):
+                    rows = before[begin[start + i] : begin[start + i + 1]]
+                    if len(rows):
+                        mass = known[i, PROBABILITY] * (known[i, LOST] + LEFT_OUT)
+                        lost += mass
+                        mass *= abs(transitions[modes + i, j])
+                        beyond += mass * seen_beyond(earlier, model, rows, y[t], room)
                 status, kept = corrected(
                     model,
                     room,
@@ -890,8 +898,8 @@ def advance(
                     total,
                     later_count,
                     accuracy,
-                    first,
-                    known[j, EXPECTED],
+                    lost,
+                    beyond,
                     here[j],
                 )
             here[j, STATUS] = status
