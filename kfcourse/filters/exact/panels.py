@@ -435,27 +435,6 @@ def sorted_rows(P, n, whole):
 
 
 @njit(**INNER)
-def seen_beyond(earlier, model, B, y, room):
-    """p(y) of what a posterior's panels B have lost, if all of it lay at both of their ends.
-
-    So a record that contradicts the model is known: measurements lead to where the state was never
-    thought to be, by and by or at once, and what is lost grows with each.  Of records as the model
-    makes them it does not grow, in the mean.
-    """
-    x, z, q, near, _ = room.point
-    density_of_y = 0.0
-    for place in (B[0, LEFT], B[len(B) - 1, RIGHT]):
-        x[:] = place
-        earlier.law(earlier.moves, Q, 0.0, earlier.constants, x, z, q)
-        for i in range(Q):
-            x[i] = z[i] + q[i] * NODE[i]
-        residual(model, model.meter, y, 0.0, room.point)
-        for i in range(Q):
-            density_of_y += 0.5 * NODE_WEIGHT[i] * density(q[i] - 0.5 * near[i] * near[i])
-    return density_of_y
-
-
-@njit(**INNER)
 def lacking(room, groups, place, top):
     """Error by each mass that the prediction lacks, if all of it were where the posterior is.
 
@@ -815,6 +794,35 @@ def prediction(model, posterior, begin, numbers, weight, room, accuracy):
     return status, total
 
 
+@njit(**INNER)
+def left_out(earlier, model, posterior, begin, numbers, weight, y, room):
+    """The mass that the prediction lacks, and its part of the density of y.
+
+    All that a posterior's panels have lost is taken to lie at both of their ends.  So a record that
+    contradicts the model is known: measurements lead to where the state was never thought to be, by
+    and by or at once, and what is lost grows with each.  Of records as the model makes them it does
+    not grow, in the mean.
+    """
+    (x, z, q, near, _), lost, beyond = room.point, 0.0, 0.0
+    modes, mode = len(weight), model.meter // 2
+    for i in range(modes):
+        rows = posterior[begin[i] : begin[i + 1]]
+        mass = numbers[i, PROBABILITY] * (numbers[i, LOST] + LEFT_OUT)
+        lost += mass
+        for end in range(2 if len(rows) else 0):
+            x[:], share = rows[-end, LEFT + end], 0.5 * mass * abs(weight[i, mode])
+            if weight[i, mode] < 0:
+                earlier.law(-1 - i * modes - mode, Q, 0.0, earlier.constants, x, z, q)
+                share *= z[0]
+            earlier.law(earlier.moves, Q, 0.0, earlier.constants, x, z, q)
+            for k in range(Q):
+                x[k] = z[k] + q[k] * NODE[k]
+            residual(model, model.meter, y, 0.0, room.point)
+            for k in range(Q):
+                beyond += share * NODE_WEIGHT[k] * density(q[k] - 0.5 * near[k] * near[k])
+    return lost, beyond
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def advance(
     law,
@@ -863,6 +871,7 @@ def advance(
     """
     room = room_for_a_step()
     T, modes, used = len(y), transitions.shape[1], 0
+    chain = transitions[modes:]
     after, places = np.empty((8 * T * modes + 64, KEPT)), np.zeros(T * modes + 1, dtype=np.int64)
     for t in range(T):
         start = t * modes
@@ -872,9 +881,7 @@ def advance(
             moves = 2 * modes if first else 2 * j
             earlier = Setting(law, moves, 2 * j + 1, constants[1], turns)
             model = Setting(law, 2 * j, 2 * j + 1, constants[0], turns)
-            status, total = prediction(
-                earlier, before, begin[start:], known, transitions[modes:], room, accuracy
-            )
+            status, total = prediction(earlier, before, begin[start:], known, chain, room, accuracy)
             n = borders(room, total.edges) if status == FINE and total.edges else 0
             if back and n:
                 rows = later[later_begin[t] : later_begin[t + 1]]
@@ -883,13 +890,10 @@ def advance(
             kept, here[j, EVIDENCE] = 0, -np.inf
             if status == FINE and n:
                 lost = beyond = 0.0
-                for i in range(0 if first else modes):
-                    rows = before[begin[start + i] : begin[start + i + 1]]
-                    if len(rows):
-                        mass = known[i, PROBABILITY] * (known[i, LOST] + LEFT_OUT)
-                        lost += mass
-                        mass *= abs(transitions[modes + i, j])
-                        beyond += mass * seen_beyond(earlier, model, rows, y[t], room)
+                if not first:
+                    lost, beyond = left_out(
+                        earlier, model, before, begin[start:], known, chain, y[t], room
+                    )
                 status, kept = corrected(
                     model,
                     room,
