@@ -44,7 +44,7 @@ class Side:
 
     def _at_mean(self, matrix: sp.MatrixBase) -> sp.ImmutableMatrix:
         pairs = zip((*self.x, *self.noise), (*self.mean, *self.law.mean), strict=True)
-        return sp.ImmutableMatrix(matrix.subs(dict(pairs), simultaneous=True))
+        return matrix.subs(dict(pairs), simultaneous=True)
 
     @cached_property
     def value(self) -> sp.ImmutableMatrix:
@@ -52,11 +52,11 @@ class Side:
 
     @cached_property
     def A(self) -> sp.ImmutableMatrix:
-        return self._at_mean(self.equation.jacobian(sp.Matrix(self.x)))
+        return self._at_mean(self.equation.jacobian(self.x))
 
     @cached_property
     def B(self) -> sp.ImmutableMatrix:
-        return self._at_mean(self.equation.jacobian(sp.Matrix(self.noise)))
+        return self._at_mean(self.equation.jacobian(self.noise))
 
     @property
     def D(self) -> sp.ImmutableMatrix:
@@ -69,8 +69,8 @@ class Side:
 
 @lru_cache(maxsize=64)  # the same for all values of the parameters
 def taylor(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
-    """Value at the mean, slope A, and A cov A^T + B D B^T."""
-    if any(part.has(sp.Derivative, sp.DiracDelta) for part in (side.A, side.B)) or any(
+    """Value at the mean, slope A, A cov A^T + B D B^T, and its second part alone."""
+    if side.A.row_join(side.B).has(sp.Derivative, sp.DiracDelta) or any(
         jumps(choice, [*side.x, *side.noise]) for choice in side.equation.atoms(sp.Piecewise)
     ):
         raise NoClosedForm(
@@ -78,12 +78,17 @@ def taylor(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
             f"unscented(model) or gauss_hermite(model)",
             "no_slope",
         )
-    return side.value, side.A, side.A * side.cov * side.A.T + side.B * side.D * side.B.T
+    of_noise = side.B * side.D * side.B.T
+    cov = side.A * side.cov * side.A.T + of_noise
+    # its upper half, twice: SymPy multiplies out at once what it has seen
+    cov = sp.ImmutableMatrix(*cov.shape, lambda i, j: cov[min(i, j), max(i, j)])
+    return side.value, side.A, cov, of_noise
 
 
 @lru_cache(maxsize=64)
 def moments(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
-    """Mean, its slope by the state's mean, and covariance, over independent state and noise."""
+    """Mean, its slope by the state's mean, covariance, and what of it the state does not explain,
+    over independent state and noise."""
     law = GaussianMoments(
         [*side.x, *side.noise], [*side.mean, *side.law.mean], sp.diag(side.cov, side.D)
     )
@@ -93,7 +98,8 @@ def moments(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
         (i, j): law.covariance(parts[i], parts[j]) for i in range(size) for j in range(i, size)
     }
     cov = sp.ImmutableMatrix(size, size, lambda i, j: upper[min(i, j), max(i, j)])
-    return mean, mean.jacobian(side.mean), cov
+    slope = mean.jacobian(side.mean)
+    return mean, slope, cov, cov - slope * side.cov * slope.T
 
 
 def gaussian_symbols(

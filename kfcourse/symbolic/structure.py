@@ -158,6 +158,7 @@ class StructuralFormulas:
     m: sp.ImmutableMatrix
     d: sp.ImmutableMatrix
     functions: dict[str, sp.ImmutableMatrix]
+    unexplained: tuple[sp.ImmutableMatrix, ...]  # Q and R, not multiplied out
 
     @property
     def state_arguments(self) -> list[sp.Symbol]:
@@ -170,19 +171,18 @@ class StructuralFormulas:
     @cached_property
     def R(self) -> sp.ImmutableMatrix:
         """F - G d G^T, the part of the measurement's covariance that the state does not explain."""
-        G, F = self.functions["G"], self.functions["F"]
-        return _expanded(sp.ImmutableMatrix(F - G * self.d * G.T))
+        return _expanded(self.unexplained[1])
 
     @cached_property
     def A(self) -> sp.ImmutableMatrix:
         """dtau/dz, the twin of G = dh/dm: Cov(x_k, x_{k+1}) = p A^T."""
-        return sp.ImmutableMatrix(self.functions["tau"].jacobian(self.z))
+        return self.functions["tau"].jacobian(self.z)
 
     @cached_property
     def Q(self) -> sp.ImmutableMatrix:
         """Theta - A p A^T, the part of the next state's covariance that this state does not
         explain."""
-        return _expanded(sp.ImmutableMatrix(self.functions["Theta"] - self.A * self.p * self.A.T))
+        return _expanded(self.unexplained[0])
 
     @cached_property
     def compiled_predict(self) -> Stepwise:
@@ -283,11 +283,12 @@ def _derived(
     if model.between is not None:
         return model.between.structure(model, build)
     state, meter = Side.of(model, "object"), Side.of(model, "meter")
-    (tau, _, Theta), (h, G, F) = moments_of(state), moments_of(meter)
+    (tau, _, Theta, Q), (h, G, F, R) = moments_of(state), moments_of(meter)
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": G, "F": F}
     expanded = {key: _expanded(part, **hints) for key, part in functions.items()}
-    laws = state.mean, state.cov, meter.mean, meter.cov
-    return StructuralFormulas(model, name, *laws, expanded).structure()
+    return StructuralFormulas(
+        model, name, state.mean, state.cov, meter.mean, meter.cov, expanded, (Q, R)
+    ).structure()
 
 
 @lru_cache(maxsize=256)  # modes often have the same object, or the same meter, with other numbers
