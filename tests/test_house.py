@@ -205,7 +205,7 @@ ROOMS = {
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
     "kfcourse/continuous": 10_140,
-    "kfcourse/filters": 32_370,
+    "kfcourse/filters": 32_380,
     "kfcourse/lab": 19_520,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,

@@ -122,9 +122,9 @@ def test_a_long_fault_leaves_the_exact_filter_sure_of_itself(name):
     """What panels lack lies at their ends, not where modes that hardly anybody believes have led;
     and where transitions depend on the state it goes one way, not all.
 
-    Measured as if it lay there, the loss grew with each measurement of this fault, until the last
-    one had no posterior: the lab's comparisons of these variants had no bound.  The reference are both
-    densities on 1,801 points, .05 apart, where the object's noise has the deviation .7.
+    The filter that thought otherwise saw its loss grow with each measurement of a fault, until the
+    last had no posterior: the lab's comparisons of these variants had no bound.  The reference is a
+    grid of both densities, 1,801 points, .05 apart, where the object's noise has the deviation .7.
     """
     model, y = find_variant(name).model, np.array(FAULTS[name].split(), dtype=float)
     x = np.linspace(-40, 50, 1801)

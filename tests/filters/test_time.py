@@ -39,8 +39,8 @@ U = list(oracles.Changing.U)
 
 
 def test_trajectories_satisfy_the_equations_of_each_step():
-    """They begin as the prior says; what is left of them are the noises, in their places and sizes, independent of one another,
-    of the states and of those before: four standard errors."""
+    """They begin as the prior says; what is left of them are the noises, in their places and sizes,
+    independent of one another, of the states and of those before: four standard errors."""
     system, runs = LINEAR["changing"], 4000
     x, y = simulate(system.model(), runs, STEPS, seed=1)
     _, (m_v, D_v), (m_w, D_w) = system.laws.values()

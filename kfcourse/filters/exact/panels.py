@@ -809,8 +809,10 @@ def left_out(earlier, model, posterior, begin, numbers, weight, y, room):
         rows = posterior[begin[i] : begin[i + 1]]
         mass = numbers[i, PROBABILITY] * (numbers[i, LOST] + LEFT_OUT)
         lost += mass
-        for end in range(2 if len(rows) else 0):
-            x[:], share = rows[-end, LEFT + end], 0.5 * mass * abs(weight[i, mode])
+        if not len(rows):
+            continue
+        for place in (rows[0, LEFT], rows[len(rows) - 1, RIGHT]):
+            x[:], share = place, 0.5 * mass * abs(weight[i, mode])
             if weight[i, mode] < 0:
                 earlier.law(-1 - i * modes - mode, Q, 0.0, earlier.constants, x, z, q)
                 share *= z[0]
