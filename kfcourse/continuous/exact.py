@@ -129,11 +129,12 @@ def by_substeps(
         return replace(exact, model=replace(moves, known=Known(symbols, inputs=inputs)))
 
     def foreseen(k: int, start: State, substeps: int) -> State:
-        """All sub-steps to t_k but the last, of which there is the prediction only."""
+        """All sub-steps to t_k but the last, and what this would lead to as its prediction."""
         inner, state = at(k, substeps), start._replace(step=1)
+        nothing = np.full((len(start.posterior.mean), 1), np.nan)
         for _ in range(substeps - 1):
-            state = inner.step(state, np.full((len(start.posterior.mean), 1), np.nan))
-        return state
+            state = inner.step(state, nothing)
+        return state._replace(predicted=inner.step(state, nothing).posterior)
 
     def ahead(k: int, start: State, enough: int) -> Underway:
         coarse, substeps = None, enough

@@ -24,7 +24,8 @@ class State(NamedTuple):
     posterior : Gaussian
         Estimate z (runs, n) and its error covariance as the filter sees it, (..., n, n).
     predicted : Gaussian
-        Prediction lambda (runs, n) of the next state, and Psi (..., n, n).
+        Prediction lambda (runs, n) of the next state, and Psi (..., n, n).  The exact filter goes
+        without: NaN, and `predictions` finds them by a step without measurement.
     memory : object
         What else the filter remembers (grid, particles); None for most.
     expected : Measurement, optional

@@ -81,7 +81,14 @@ def predictions(filter_: Filter, y: Array) -> Gaussian:
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    return stacked([state.predicted for state in walk(filter_, y)][:-1])
+    y = measurements(filter_, y)
+    nothing = np.full(y.shape[1:], np.nan)
+
+    def ahead(state: State) -> Gaussian:
+        known = not np.isnan(state.predicted.mean).all()
+        return state.predicted if known else filter_.step(state, nothing).posterior
+
+    return stacked([ahead(state) for state in walk(filter_, y)][:-1])
 
 
 def states(filter_: Filter, y: Array) -> list[State]:

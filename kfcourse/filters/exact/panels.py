@@ -27,7 +27,7 @@ date.
 
 from __future__ import annotations
 
-from math import atan2, cos, exp, floor, log, sin, sqrt
+from math import exp, floor, log, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,8 +43,6 @@ from kfcourse.filters.exact.columns import (
     LIKELY,
     LOST,
     MEAN,
-    NEXT_MEAN,
-    NEXT_VARIANCE,
     PROBABILITY,
     RIGHT,
     STATUS,
@@ -77,18 +75,16 @@ WOUND = 50  # turns of an angle whose noise is so large that it tells nothing
 FINE, PANELLED, KERNELLED, EMPTY = range(4)
 
 # Columns of a panel's row that are of the step itself, behind those that are kept.
-HIGH, MASS, FIRST, SECOND, ROUGH, LOG_ROUGH, BOUND, SHARE, BEFORE, FIT = range(KEPT, KEPT + 10)
-COLUMNS = KEPT + 10
+HIGH, MASS, FIRST, SECOND, ROUGH, LOG_ROUGH, BOUND, SHARE, COLUMNS = range(KEPT, KEPT + 9)
 
 POINT = np.concatenate([[-1.0], legendre.legroots(legendre.legder([0] * (Q - 1) + [1])), [1.0]])
 WEIGHT = 2 / (Q * (Q - 1) * legendre.legval(POINT, [0] * (Q - 1) + [1]) ** 2)
+LN_WEIGHT = np.log(WEIGHT)
 # of Legendre's polynomials, from values
 COEFFICIENT = np.linalg.inv(legendre.legvander(POINT, Q - 1))
 LAST, LAST_BUT_ONE = COEFFICIENT[-1].copy(), COEFFICIENT[-2].copy()
-POWER = np.array([legendre.leg2poly(column) for column in COEFFICIENT.T]).T.copy()
-SLOPE = np.array(
-    [legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T]
-).T.copy()
+POWER = np.array([legendre.leg2poly(column) for column in COEFFICIENT.T])
+SLOPE = np.array([legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T])
 
 # of a normal law, and what they weigh
 NODE, NODE_WEIGHT = hermite_e.hermegauss(Q)
@@ -170,8 +166,7 @@ class Room(NamedTuple):
         group (3, KERNELS / Q): of Q kernels, where they begin and end, their least deviation
         edge (4 PANELS, 3): a place; +1 where a law begins, -1 where it ends, 0 at a border; a
             deviation
-        later: three vectors (KERNELS,), a prediction's kernels as means, masses, variances; or
-            what later measurements tell, as points, weights, deviations
+        later: three vectors (KERNELS,), what later measurements tell: points, weights, deviations
         stack (TURNS + 2, 2): parts of a panel that wait
         point: five vectors (Q,), for arguments and results of the law; work: four
     """
@@ -187,11 +182,12 @@ class Room(NamedTuple):
 
 
 class Sum(NamedTuple):
-    """How much of the room a prediction takes: groups, edges, a bound of its density; an error of
-    it."""
+    """How much of the room a prediction takes: groups, edges; its mass, a bound of its density, an
+    error of it."""
 
     groups: int
     edges: int
+    mass: float
     height: float
     rough: float
 
@@ -314,19 +310,19 @@ def evaluate(model, room, y, p, total, later):
     """The logarithm of the posterior at the points of a panel, and what follows from it."""
     row, (x, z, q, near, _) = room.panels[p], room.point
     points(row[LEFT], row[RIGHT], x)
-    residual(model, model.meter, y, 0.0, room.point)
     predicted(room, total, x, row)
-    for i in range(Q):
-        row[LIKELY + i] = q[i] - 0.5 * near[i] * near[i]
+    if row[BOUND] == np.inf:  # else `search` knows what y tells
+        residual(model, model.meter, y, 0.0, room.point)
+        for i in range(Q):
+            row[LIKELY + i] = q[i] - 0.5 * near[i] * near[i]
     if later:
         log_later(model, room, later)
         for i in range(Q):
             row[LIKELY + i] += z[i]
     high = -np.inf
     for i in range(Q):
-        before, row[i] = row[i], max(row[i] + row[LIKELY + i], -1e100)
-        if row[i] > high:
-            high, row[BEFORE], row[FIT] = row[i], before, abs(near[i])
+        row[i] = max(row[i] + row[LIKELY + i], -1e100)
+        high = max(high, row[i])
     mass = first = second = 0.0
     logarithms, values = z, q
     for i in range(Q):
@@ -376,7 +372,8 @@ def search(model, which, y, spread, room, n):
         residual(model, which, y, spread, room.point)
         bound, hidden = -np.inf, False
         for i in range(Q):
-            best = max(best, q[i] - 0.5 * near[i] * near[i])
+            P[p, LIKELY + i] = q[i] - 0.5 * near[i] * near[i]
+            best = max(best, P[p, LIKELY + i])
         for i in range(Q - 1):
             low = depth(z, near, turn, i)
             top = max(q[i], q[i + 1]) - 0.5 * low * low
@@ -450,6 +447,20 @@ def lacking(room, groups, place, top):
 
 
 @njit(**INNER)
+def at_its_highest(model, room, y, p):
+    """Where a panel's posterior is highest: the logarithm of the prediction, and how far y is, in
+    deviations of the meter."""
+    row, (x, _, _, near, _) = room.panels[p], room.point
+    points(row[LEFT], row[RIGHT], x)
+    residual(model, model.meter, y, 0.0, room.point)
+    top = fit = 0.0
+    for i in range(Q):
+        if row[i] == row[HIGH]:
+            top, fit = row[i] - row[LIKELY + i], abs(near[i])
+    return top, fit
+
+
+@njit(**INNER)
 def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
     """The posterior from the n first panels: how it ended, and how many are left, in order.
 
@@ -509,11 +520,11 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
             break
     else:
         return PANELLED, 0
-    whole, top = peak + log(integral), P[likeliest, BEFORE]
+    whole, (top, fit) = peak + log(integral), at_its_highest(model, room, y, likeliest)
     error += ROUNDING * abs(origin) / sqrt(variance)
     if not variance > 1e-300:
         return EMPTY, 0
-    error += 1.0 if P[likeliest, FIT] > IMPOSSIBLE else 0.0
+    error += 1.0 if fit > IMPOSSIBLE else 0.0
     numbers[LOST] = exp(min(log(beyond) - whole, 100.0)) if beyond > 0 else 0.0
     error += lost * lacking(room, total.groups, origin, top) + REACH * REACH * numbers[LOST]
     error += total.rough
@@ -545,17 +556,23 @@ def between(before, after, t):
 
 
 @njit(**INNER)
-def polynomial(row, start, power):
-    """Powers' coefficients of a row's logarithms, from `start` on, less the highest, which is
-    returned."""
+def highest(row, start):
+    """Of a row's logarithms from `start` on."""
     top = -np.inf
     for i in range(Q):
         top = max(top, row[start + i])
+    return top
+
+
+@njit(**INNER)
+def polynomial(row, start, top, power):
+    """Powers' coefficients of a row's logarithms, from `start` on, less the highest of them."""
     for k in range(Q):
         power[k] = 0.0
-        for i in range(Q):
-            power[k] += POWER[k, i] * max(row[start + i] - top, -80.0)
-    return top
+    for i in range(Q):
+        value = max(row[start + i] - top, -80.0)
+        for k in range(Q):
+            power[k] += POWER[i, k] * value
 
 
 @njit(**FAST)
@@ -582,15 +599,13 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
     The logarithm of a weight is `shift`; a weight that depends on the state is a law, `weight_law`
     < 0.
     """
-    kernel, group, edge, stack, (means, masses, variances) = (
-        room.kernel, room.group, room.edge, room.stack, room.later
-    )  # fmt: skip
-    (x, m, s, _, _), (power, mass, deviation, weight) = room.point, room.work
-    count, many, height, error = total
+    kernel, group, edge, stack = room.kernel, room.group, room.edge, room.stack
+    (x, m, s, slope, _), (power, mass, deviation, weight) = room.point, room.work
+    count, many, whole, height, error = total
     span = SPAN * min(accuracy / 1e-3, 1.0) ** (1 / 14)
     for p in range(len(B)):
         middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
-        top, (before, after) = polynomial(B[p], 0, power), widths(B, p)
+        top, (before, after) = highest(B[p], 0), widths(B, p)
         stack[0], waiting, low, high = (-1.0, 1.0), 1, np.inf, -np.inf
         while waiting:
             waiting -= 1
@@ -602,22 +617,27 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 model.law(weight_law, Q, 0.0, model.constants, x, weight, s)
             model.law(model.moves, Q, 0.0, model.constants, x, m, s)
             share, covered, least, calm, steep = 0.0, 0.0, np.inf, np.inf, False
-            for i in range(1, Q):
-                covered = max(covered, abs(m[i] - m[0]))
             for i in range(Q):
-                t, slope = 0.5 * (a + b) + part * POINT[i], 0.0
-                value = value_at(power, t) if part < 1 else B[p, i] - top
-                mass[i] = WEIGHT[i] * part * size * density(value + top + shift) * weight[i]
+                covered, calm = max(covered, abs(m[i] - m[0])), min(calm, s[i])
+                slope[i] = 0.0
+            for k in range(Q):
+                for i in range(Q):
+                    slope[i] += SLOPE[k, i] * m[k]
+            length = ln(part * size)
+            for i in range(Q):
+                value = B[p, i] - top
+                if part < 1:
+                    value = value_at(power, 0.5 * (a + b) + part * POINT[i])
+                x[i] = value + top + shift + length + LN_WEIGHT[i]
+            for i in range(Q):
+                mass[i] = density(x[i]) * weight[i]
                 share += mass[i]
-                for k in range(Q):
-                    slope += SLOPE[i, k] * m[k]
-                blur = abs(slope) / (part * size) * between(before, after, t)
+            for i in range(Q):
+                t = 0.5 * (a + b) + part * POINT[i]
+                blur = abs(slope[i]) / (part * size) * between(before, after, t)
                 # beside a jump or a pole the slope of a point is no measure of a panel's
-                steep, calm, blur = (
-                    steep or blur > covered,
-                    min(calm, s[i]),
-                    min(blur, covered / span),
-                )
+                steep |= blur > covered
+                blur = min(blur, covered / span)
                 deviation[i] = sqrt(s[i] * s[i] + blur * blur + 1e-300)
                 least = min(least, deviation[i])
             digits = 10 * ROUNDING * abs(m[0])
@@ -629,10 +649,12 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 or (steep and covered > calm)
             )
             if share > 1e-10 and gaps and part > 1e-9:
+                if part == 1:
+                    polynomial(B[p], 0, top, power)
                 waiting = in_halves(stack, waiting, a, b)
                 continue
             if count == KERNELS // Q:
-                return KERNELLED, Sum(0, 0, 0.0, 0.0)
+                return KERNELLED, Sum(0, 0, 0.0, 0.0, 0.0)
             group[0, count], group[1, count], group[2, count] = np.inf, -np.inf, least
             for i in range(Q):
                 j, wide = Q * count + i, max(deviation[i], covered / span)
@@ -641,14 +663,14 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 kernel[0, j], kernel[1, j] = rate, m[i] * rate
                 kernel[2, j], kernel[3, j] = amount * (1 + extra), amount * extra * 2 * LN2
                 height += kernel[2, j]
-                means[j], masses[j], variances[j] = m[i], mass[i], s[i] * s[i]
                 group[0, count] = min(group[0, count], m[i] - WINDOW * wide)
                 group[1, count] = max(group[1, count], m[i] + WINDOW * wide)
-                reach = REACH * REACH + 2 * ln(max(mass[i], 1e-299))
+                reach = REACH * REACH + 2 * x[i]
                 if reach > 0:
                     low = min(low, m[i] - sqrt(reach) * wide)
                     high = max(high, m[i] + sqrt(reach) * wide)
             count += 1
+            whole += share
             error += share * rough
             if a == -1:
                 edge[many] = m[0], 0.0, deviation[0]
@@ -659,7 +681,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
         if low < high:
             edge[many], edge[many + 1] = (low, 1.0, 0.0), (high, -1.0, 0.0)
             many += 2
-    return FINE, Sum(count, many, height, error)
+    return FINE, Sum(count, many, whole, height, error)
 
 
 @njit(**INNER)
@@ -694,7 +716,8 @@ def sources(B, least, room):
     (place, weight, blurs), stack, power, count = room.later, room.stack, room.work[0], 0
     for p in range(len(B)):
         middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
-        top, (before, after) = polynomial(B[p], LIKELY, power), widths(B, p)
+        top, (before, after) = highest(B[p], LIKELY), widths(B, p)
+        polynomial(B[p], LIKELY, top, power)
         stack[0], waiting = (-1.0, 1.0), 1
         while waiting:
             waiting -= 1
@@ -725,29 +748,6 @@ def least_deviation(model, room, n):
         for i in range(Q):
             least = min(least, s[i])
     return least
-
-
-@njit(**INNER)
-def moments(room, count, turn):
-    """Mass, mean and variance of `count` laws in the room for `later`: means, masses, variances.
-
-    Of an angle, as seen from the circular mean.
-    """
-    mean, mass, variance = room.later
-    whole = first = second = sine = cosine = 0.0
-    for i in range(count if turn < np.inf else 0):
-        sine += mass[i] * sin(mean[i])
-        cosine += mass[i] * cos(mean[i])
-    centre = atan2(sine, cosine) if turn < np.inf else mean[0]
-    for i in range(count):
-        away = short_way(mean[i] - centre, turn)
-        whole += mass[i]
-        first += mass[i] * away
-        second += mass[i] * (away * away + variance[i])
-    if not whole > 0:
-        return 0.0, 0.0, 0.0
-    first /= whole
-    return whole, short_way(centre + first, turn), second / whole - first * first
 
 
 @njit(**FAST)
@@ -784,7 +784,7 @@ def prediction(model, posterior, begin, numbers, weight, room, accuracy):
 
     weight : probabilities of transitions (J, J), negative where they depend on the state.
     """
-    status, total, modes, mode = FINE, Sum(0, 0, 0.0, 0.0), len(weight), model.meter // 2
+    status, total, modes, mode = FINE, Sum(0, 0, 0.0, 0.0, 0.0), len(weight), model.meter // 2
     for i in range(modes):
         rows, by_state = posterior[begin[i] : begin[i + 1]], weight[i, mode] < 0
         share = numbers[i, PROBABILITY] * abs(weight[i, mode])
@@ -835,7 +835,7 @@ def advance(
     begin,
     later,
     later_begin,
-    transitions,
+    chain,
     first,
     back,
     accuracy,
@@ -855,8 +855,8 @@ def advance(
         Posteriors of the step before.
     later, later_begin
         What is known of the next step, looking back.
-    transitions : ndarray (2 J, J)
-        To the next step, and to this one; negative where they depend on the state.
+    chain : ndarray (J, J)
+        Transitions to this step; negative where they depend on the state.
     first : bool
         Whether the object's law is the prior, whatever was before.
     back : bool
@@ -872,8 +872,7 @@ def advance(
         begin.
     """
     room = room_for_a_step()
-    T, modes, used = len(y), transitions.shape[1], 0
-    chain = transitions[modes:]
+    T, modes, used = len(y), len(chain), 0
     after, places = np.empty((8 * T * modes + 64, KEPT)), np.zeros(T * modes + 1, dtype=np.int64)
     for t in range(T):
         start = t * modes
@@ -890,6 +889,8 @@ def advance(
                 later_count = sources(rows, least_deviation(model, room, n), room)
                 status = status if later_count or not len(rows) else KERNELLED
             kept, here[j, EVIDENCE] = 0, -np.inf
+            # where there is no prediction, the step is refused
+            here[j, EXPECTED] = total.mass if status == FINE else 1.0
             if status == FINE and n:
                 lost = beyond = 0.0
                 if not first:
@@ -917,12 +918,4 @@ def advance(
             used += kept
             places[start + j + 1] = used
         mixed(here)
-        for j in range(0 if back else modes):
-            model = Setting(law, 2 * j, 2 * j + 1, constants[0], turns)
-            status, total = prediction(
-                model, after, places[start:], here, transitions[:modes], room, accuracy
-            )
-            mass, mean, variance = moments(room, Q * total.groups, turns[1])
-            here[j, NEXT_MEAN], here[j, NEXT_VARIANCE] = mean, variance
-            here[j, EXPECTED] = mass if status == FINE else 1.0  # so that the next step is refused
     return after[:used].copy(), places

@@ -21,7 +21,6 @@ from kfcourse.filters.exact.columns import (
     LEFT,
     LOST,
     MEAN,
-    NEXT_MEAN,
     NUMBERS,
     PROBABILITY,
     RIGHT,
@@ -85,11 +84,6 @@ class PointMass(NamedTuple):
     def probability(self) -> Array:
         """Posterior probabilities of the modes, (runs, J)."""
         return self.numbers[:, :, PROBABILITY]
-
-    @property
-    def expected(self) -> Array:
-        """Probabilities of the modes at the next step, (runs, J)."""
-        return self.numbers[:, :, EXPECTED]
 
     def density(self, run: int, mode: int = 0) -> tuple[Array, Array]:
         """States x (M,), ascending, at which a trajectory's posterior is held, and p(x, mode)
@@ -203,9 +197,9 @@ class Exact:
 
     def step(self, state: State, y: Array) -> State:
         k, before = state.step, state.memory
-        memory, posterior = self._advance(f"step {k}", k, y[:, 0], before)
-        ahead = _law(memory.numbers, NEXT_MEAN, memory.expected)
-        return State(k + 1, posterior, ahead, memory._replace(error=before.error + memory.error))
+        memory, law = self._advance(f"step {k}", k, y[:, 0], before)
+        memory = memory._replace(error=before.error + memory.error)
+        return State(k + 1, law, Gaussian(*(np.full_like(part, np.nan) for part in law)), memory)
 
     def look_back(self, states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         """`Filter.look_back` of a model without modes."""
@@ -252,11 +246,11 @@ class Exact:
         from kfcourse.filters.exact.panels import advance
 
         compiled = load(self.text)
-        chain = np.concatenate([self._transitions(k), self._transitions(k - 1)])
+        chain = self._transitions(k - 1)
         now_and_then = np.stack([constants(self.model, max(k - back, 0)) for back in (0, 1)])
         turns = np.array([2 * np.pi if which else np.inf for which in reversed(self.model.angles)])
         ahead = later or before
-        numbers, values, size = ahead.numbers.copy(), np.array(y, dtype=float), chain.shape[1]
+        numbers, values, size = ahead.numbers.copy(), np.array(y, dtype=float), len(chain)
         numbers[:, :, LOST] = before.numbers[:, :, LOST]
 
         def chunk(start: int) -> tuple[Array, Array]:
@@ -296,15 +290,20 @@ class Exact:
             rows = len(values), -1
             moments = moments_on_circle(x.reshape(rows), (mass * inside[..., None]).reshape(rows))
             numbers[:, 0, MEAN], numbers[:, 0, VARIANCE] = moments
-        law = _law(numbers, MEAN, numbers[:, :, PROBABILITY])
+        laws = [
+            Gaussian(mode[:, MEAN, None], mode[:, VARIANCE, None, None])
+            for mode in np.moveaxis(numbers, 1, 0)
+        ]
+        law = mixture(laws, numbers[:, :, PROBABILITY])
         evidence = np.where(np.isnan(y), 0.0, np.logaddexp.reduce(numbers[:, :, EVIDENCE], axis=1))
         memory = PointMass(panels, begin, numbers, evidence, _error(numbers, law), law.cov[:, 0, 0])
-        self._check(where, memory, before.expected)
+        self._check(where, memory)
         return memory, law
 
-    def _check(self, where: str, memory: PointMass, expected: Array) -> None:
+    def _check(self, where: str, memory: PointMass) -> None:
         """Unresolved if a mode that is possible has no posterior, or an error is too large."""
-        empty = (np.diff(memory.begin).reshape(expected.shape) == 0) & (expected > NEGLIGIBLE)
+        possible = memory.numbers[:, :, EXPECTED] > NEGLIGIBLE
+        empty = (np.diff(memory.begin).reshape(possible.shape) == 0) & possible
         wrong = empty.any(axis=1) | ~(memory.error < TOLERABLE)
         if not wrong.any():
             return
@@ -325,13 +324,6 @@ def _points(panels: Array) -> tuple[Array, Array]:
     left, right = panels[:, LEFT, None], panels[:, RIGHT, None]
     x = left * (0.5 - 0.5 * POINT) + right * (0.5 + 0.5 * POINT)
     return x, np.exp(panels[:, :Q]) * WEIGHT * 0.5 * (right - left)
-
-
-def _law(numbers: Array, mean: int, probability: Array) -> Gaussian:
-    """Mean and variance over all modes, from the columns `mean` and the one behind it."""
-    modes = np.moveaxis(numbers, 1, 0)
-    laws = [Gaussian(mode[:, mean, None], mode[:, mean + 1, None, None]) for mode in modes]
-    return mixture(laws, probability)
 
 
 def _error(numbers: Array, law: Gaussian) -> Array:
