@@ -34,8 +34,7 @@ from kfcourse.symbolic.model import Model
 H = sp.Symbol("length of a sub-step", positive=True)
 SMALL = sp.Rational(1, 50)  # |u| below which phi is its series, to 1e-13 of it
 FEWEST, MOST = 2, 512  # sub-steps between two measurements
-ERROR = 10  # times the accuracy: of the predicted mean and deviation of any trajectory
-EASY = 0.1  # of this error, with which the next interval begins with half as many
+EASY = 0.1  # of the accuracy, with which the next interval begins with half as many
 
 
 def normal_step(model: Model) -> Model:
@@ -104,8 +103,8 @@ def by_substeps(
     and what is known in it.
 
     An interval gets so many sub-steps that half of them change the predicted mean and deviation of
-    no trajectory by more than ten times the accuracy, in deviations; what they change of the
-    posteriors is in the stated error.
+    no trajectory by more than the accuracy, in deviations; what they change of the posteriors is in
+    the stated error.
 
     Raises
     ------
@@ -145,8 +144,8 @@ def by_substeps(
                 fine = None
             if coarse and fine:
                 error = doubt * apart(coarse.predicted, fine.predicted, model.angles.x)
-                if error.max() <= ERROR * accuracy:
-                    easy = error.max() < EASY * ERROR * accuracy
+                if error.max() <= accuracy:
+                    easy = error.max() < EASY * accuracy
                     enough = max(substeps // (4 if easy else 2), FEWEST)
                     return Underway(start.memory, fine, coarse, substeps, enough)
             coarse, substeps = fine, 2 * substeps

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -46,6 +47,7 @@ from kfcourse.scenarios.navigation import Dynamics, Sensor, fuse, observe
 pytestmark = pytest.mark.quick
 
 PI = np.pi
+FINE = partial(pointmass, accuracy=1e-3)
 
 
 # ---------------------------------------------------------------- what is said of a model
@@ -321,7 +323,7 @@ def by_grid(meter_sd, prior, y):
         (["x", "y"], (1.0, 9.0), 0.5),
     ],
 )
-@pytest.mark.parametrize("build", [pointmass, lambda model: particle(model, 20_000)])
+@pytest.mark.parametrize("build", [FINE, lambda model: particle(model, 20_000)])
 def test_filters_of_densities_on_the_circle(build, angles, prior, meter_sd):
     """Against a fine grid: a narrow prior near the jump, a wide one that leaves several turns
     possible, a sharp meter; and an estimate of a state that is an angle, which counts no turns.
@@ -334,7 +336,7 @@ def test_filters_of_densities_on_the_circle(build, angles, prior, meter_sd):
     y = np.array([3.1, -3.0, 2.9, -2.7, -2.2])
     densities, x = by_grid(meter_sd, prior, y)
     ours = run(build(model), y)
-    allowed = 1e-4 if build is pointmass else 5 / np.sqrt(20_000 / 50)
+    allowed = 1e-4 if build is FINE else 5 / np.sqrt(20_000 / 50)
     for density, z, p in zip(densities, ours.mean.ravel(), ours.cov.ravel(), strict=True):
         if "x" in angles:
             mean, variance = moments_on_circle(x, density)

@@ -98,7 +98,7 @@ def test_it_is_the_posterior_of_the_whole_trajectory(name, missing):
     y = simulate(model, 5, 3, seed=3).y.copy()
     if missing is not None:
         y[missing] = np.nan
-    filter_ = pointmass(model)
+    filter_ = pointmass(model, accuracy=1e-3)
     smoothed, error = smooth(filter_, y), smoothing_error(filter_, y)
     for i in range(5):
         sds = np.sqrt(smoothed.cov[:, i, 0, 0])
