@@ -238,20 +238,29 @@ def residual(model, which, y, spread, point):
     x, z, q, near, turn = point
     model.law(which, Q, y, model.constants, x, z, q)
     whole = model.turns[0 if which == model.meter else 1]
-    for i in range(Q):
-        deviation = max(sqrt(q[i] * q[i] + spread * spread), 1e-150)
+    # a loop for each array, so that processors take many numbers at once
+    n = len(x)
+    for i in range(n):
+        q[i] = max(sqrt(q[i] * q[i] + spread * spread), 1e-150)
+    for i in range(n):
         away = y - z[i]
-        z[i] = away / deviation
-        noisy = 1e-150 < deviation < np.inf
-        if not noisy or z[i] != z[i]:
+        z[i] = away / q[i]
+        if not 1e-150 < q[i] < np.inf or z[i] != z[i]:
             z[i] = -np.inf if away < 0 else np.inf
         z[i] = min(max(z[i], -1e100), 1e100)
-        q[i] = -ln(min(deviation, 1e150)) - LOG_ROOT if noisy else -345.0
-        turn[i] = whole / deviation
-        if y != y:
-            z[i], q[i], turn[i] = 0.0, 0.0, np.inf
+    for i in range(n):
         near[i] = z[i]
-    for i in range(Q if whole < np.inf and y == y else 0):
+        turn[i] = np.inf
+    if whole < np.inf:
+        for i in range(n):
+            turn[i] = whole / q[i]
+    for i in range(n):
+        q[i] = -ln(min(q[i], 1e150)) - LOG_ROOT if 1e-150 < q[i] < np.inf else -345.0
+    if y != y:
+        for i in range(n):
+            z[i] = near[i] = q[i] = 0.0
+            turn[i] = np.inf
+    for i in range(n if whole < np.inf and y == y else 0):
         near[i] = short_way(z[i], turn[i])
         q[i] += wound(abs(near[i]), turn[i])
 
