@@ -64,6 +64,7 @@ from kfcourse.laws import (
     transpose,
 )
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.jumping import probabilities as sums_to_one
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import product_rule
 from kfcourse.symbolic.structure import Structure, expect_each
@@ -307,36 +308,17 @@ def _checked(
     jumping = transition if isinstance(transition, JumpModel) else None
     if probabilities is None:
         probabilities = np.full(size, 1.0 / size) if jumping is None else jumping.first
-    start = _probabilities("probabilities", probabilities, (size,))
+    start = sums_to_one("probabilities", probabilities, (size,))
     if jumping is not None and jumping.by_state:
         return by_state(jumping), start, first
     given = transition.transition_at if isinstance(transition, JumpModel) else transition
 
-    def pi_at(k: int) -> Array:
-        return _probabilities("transition", given(k) if callable(given) else given, (size, size))
-
-    constant = pi_at(0)
-
     def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
-        return pi_at(k) if callable(given) else constant, [[law] * size for law in laws]
+        pi = sums_to_one("transition", given(k) if callable(given) else given, (size, size))
+        return pi, [[law] * size for law in laws]
 
+    links(0, [])  # what is no chain is refused here
     return links, start, first
-
-
-def _probabilities(what: str, given: Array, shape: tuple[int, ...]) -> Array:
-    """The probabilities, whose rows sum to 1; ValueError if they are none."""
-    table = np.asarray(given, dtype=float)
-    if table.shape != shape:
-        raise ValueError(
-            f"{what} must have the shape {shape} for {shape[0]} mode(s), got {table.shape}"
-        )
-    total = table.sum(axis=-1, keepdims=True)
-    if not (np.isfinite(table).all() and table.min() >= 0 and np.allclose(total, 1.0, atol=1e-9)):
-        raise ValueError(
-            f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got "
-            f"{table.tolist()}"
-        )
-    return table / total
 
 
 def by_state(model: JumpModel) -> Links:

@@ -138,10 +138,9 @@ def test_averaged_equations():
             "^`transition`: an entry = True: expected a finite number",
         ),
         ({"first": [0.8, 0.3]}, r"`first`: \[0.8, 0.3\] are no probabilities"),
-        ({"first": [1.0]}, "`first` must be 2 probabilities"),
-        ({"first": "often"}, "`first` must be 2 probabilities"),
-        ({"first": None}, r"`first` must be 2 probabilities.*; got None"),
-        ({"modes": {}}, "`modes` must be a table of modes by name"),
+        ({"first": [1.0]}, r"`first` must be probabilities of the shape \(2,\)"),
+        ({"first": None}, r"`first` must be probabilities of the shape .* mode\(s\); got None"),
+        ({"modes": {}}, "`modes` has no mode"),
         (
             with_odd({"prior": {"mean": 1}}),
             "mode odd: modes may differ in state, meter, .* not in prior",
