@@ -13,8 +13,8 @@ state and its measurement,
 
 and a step of Gauss and Newton, which is a correction with g and R taken for affine and constant at
 the last s, finds a normal law of s; some of them, from s = 0, find a mode of the posterior and its
-width.  q is a wider law of Student's there, beside a part of N(0, I) itself.  The initial state is
-a noise, too: x_0 = m + L s.
+width.  q is a wider one there, beside a part of N(0, I) itself, which bounds the weights.  The
+initial state is a noise, too: x_0 = m + L s.
 
 Of a model that jumps a particle is a state and a mode.  The next mode is drawn with probability in
 proportion to pi_ij(x) times the normal density of y_k that the proposal of mode j has left.
@@ -38,7 +38,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
@@ -65,8 +64,7 @@ ROUNDS = 2
 SMALL = 1e-4  # step in s by which slopes are found, in standard deviations
 # width of a law of s: the root of a nearly singular covariance is right to as much
 NARROWEST = 1e-7
-# of Student's law around the mode, whose tails the posterior's must not exceed
-FREEDOM, WIDER = 4.0, 1.2
+WIDER = 1.2  # the law around the mode, whose tails the posterior's must not exceed
 PRIOR = 0.1  # share drawn from N(0, I) and of modes drawn by pi, for what a normal law does not see
 LARGEST = 1e70  # variances by fourth powers of larger states are infinite
 
@@ -341,20 +339,15 @@ class Mode(NamedTuple):
 
 
 def _wide(rng: np.random.Generator, law: Gaussian) -> tuple[Array, Array]:
-    """s (..., r) by a mixture of Student's law around a normal one and of N(0, I), and ln N(s; 0,
-    I) / q."""
+    """s (..., r) by a mixture of a wider normal law and of N(0, I), and ln N(s; 0, I) / q."""
     shape, r = law.mean.shape[:-1], law.mean.shape[-1]
     cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + NARROWEST**2 * np.eye(r)
     root = WIDER * np.linalg.cholesky(cov)
-    normal = rng.standard_normal(law.mean.shape)
-    student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, shape))[..., None]
-    s = np.where((rng.random(shape) < PRIOR)[..., None], normal, law.mean + apply(root, student))
+    normal, plain = rng.standard_normal(law.mean.shape), rng.random(shape) < PRIOR
+    s = np.where(plain[..., None], normal, law.mean + apply(root, normal))
     square = (apply(np.linalg.inv(root), s - law.mean) ** 2).sum(axis=-1)
-    log = -0.5 * (FREEDOM + r) * np.log1p(square / FREEDOM) - np.log(
-        np.diagonal(root, axis1=-2, axis2=-1)
-    ).sum(axis=-1)
     # over (2 pi)^(-r/2)
-    log += gammaln((FREEDOM + r) / 2) - gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM / 2)
+    log = -0.5 * square - np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
     standard = -0.5 * (s * s).sum(axis=-1)
     return s, standard - np.logaddexp(log + np.log(1 - PRIOR), standard + np.log(PRIOR))
 
