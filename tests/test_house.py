@@ -212,7 +212,7 @@ ROOMS = {
     "kfcourse/pages": 9_560,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
-    "kfcourse/symbolic": 20_980,
+    "kfcourse/symbolic": 20_950,
     "tests": 187_530,
 }
 OF_LAYOUT = {
