@@ -96,26 +96,18 @@ def record():
 STEPS = [(Phi, shift, Q, H, np.zeros(2), R) for Phi, shift, Q in transitions()]
 
 
+@pytest.mark.parametrize(("extra", "allowed"), [("", 1e-11), (CUBIC, 1e-8)])
 @pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
-def test_a_linear_model_has_kalmans_filter(structure):
-    filter_, y = aof(structure(oscillator())), record()
+def test_a_linear_model_has_kalmans_filter(structure, extra, allowed):
+    """By the exponential of its matrix, but for Simpson's rule, 1e-13; or integrated, some tens of
+    steps."""
+    filter_, y = aof(structure(oscillator(extra, accuracy=1e-9))), record()
     ours = predictions(filter_, y), run(filter_, y)
     for i in range(4):
         for k, laws in enumerate(oracles.kalman_loop(STEPS, PRIOR, y[:, i])):
             for law, wanted in zip(ours, laws, strict=True):
-                # Simpson's rule: 1e-13
-                assert_allclose(law.mean[k, i], wanted[0], rtol=0, atol=1e-11)
-                assert_allclose(law.cov[k, i], wanted[1], rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
-def test_integrated_the_linear_model_is_the_same_but_for_the_accuracy(structure):
-    y = record()
-    for accuracy in (1e-5, 1e-9):
-        filter_ = aof(structure(oscillator(CUBIC, accuracy=accuracy)))
-        error = run(filter_, y).mean - run(aof(linearised(oscillator())), y).mean
-        assert np.abs(error).max() < 100 * accuracy  # some tens of steps
-    assert np.abs(error).max() < 1e-8
+                assert_allclose(law.mean[k, i], wanted[0], rtol=0, atol=allowed)
+                assert_allclose(law.cov[k, i], wanted[1], rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize(("extra", "allowed"), [("", 1e-10), (CUBIC, 1e-7)])
