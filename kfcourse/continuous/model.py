@@ -21,11 +21,12 @@ from kfcourse.symbolic.reading import (
     ModelError,
     Names,
     by_name,
-    exact_number,
     formula_list,
+    fresh,
     law,
+    numbered,
+    parameter_values,
     read,
-    table,
 )
 
 
@@ -100,24 +101,11 @@ class ContinuousModel:
         >>> ContinuousModel.define("-x + cos(t)", "1 + exp(-t)", "x")
         ContinuousModel(dx/dt = -x + xi*(1 + exp(-t)) + cos(t), y = x + n)
         """
-        given = table("parameters", parameters)
-        values = {
-            check_name(name): exact_number(f"parameter {name}", value)
-            for name, value in given.items()
-        }
-        f, S = (
-            formula_list(what, _plain(formulas))
-            for what, formulas in (("drift", drift), ("signal", signal))
-        )
+        values = parameter_values(parameters)
+        f, S = formula_list("drift", drift), formula_list("signal", signal)
         g = diffusion_rows(diffusion)
         n, noises = len(f), len(g[0])
-        names = [
-            *(
-                [symbols]
-                if isinstance(symbols, str)
-                else symbols or (["x"] if n == 1 else [f"x{i + 1}" for i in range(n)])
-            )
-        ]
+        names = [*([symbols] if isinstance(symbols, str) else symbols or numbered("x", n))]
         if len(names) != n or len(g) != n:
             raise ModelError(
                 f"{n} drift formula(s), {len(g)} row(s) of diffusion and the state symbols "
@@ -180,11 +168,10 @@ class ContinuousModel:
             else None
         )
 
-    def fresh(self, name: str) -> sp.Symbol:
-        """A symbol of that name, with underscores if the model uses it already."""
-        while name in self.parameters or name in by_name(self.x):
-            name += "_"
-        return symbol(name)
+    @property
+    def taken(self) -> set[str]:
+        """The names of its symbols."""
+        return {*self.parameters, *by_name(self.x)}
 
     def __repr__(self) -> str:
         xi = [symbol(name) for name in numbered("xi", self.diffusion.cols)]
@@ -195,15 +182,6 @@ class ContinuousModel:
         ]
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
         return f"ContinuousModel({', '.join(rows)}{'; ' if values else ''}{values})"
-
-
-def numbered(name: str, size: int) -> list[str]:
-    return [name] if size == 1 else [f"{name}{i + 1}" for i in range(size)]
-
-
-def _plain(formulas: Any) -> Any:
-    """A matrix as a list: SymPy's immutable matrices are expressions, too."""
-    return list(formulas) if isinstance(formulas, sp.MatrixBase) else formulas
 
 
 def diffusion_rows(diffusion: Any) -> list[list[Formula]]:
@@ -240,8 +218,8 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
     expect(model, ContinuousModel, "to_discrete")
     check_step(step)
     T = sp.Rational(str(float(step)))
-    v = [model.fresh(name) for name in numbered("v", model.diffusion.cols)]
-    w = [model.fresh(name) for name in numbered("w", model.p)]
+    v = [fresh(name, model.taken) for name in numbered("v", model.diffusion.cols)]
+    w = [fresh(name, model.taken) for name in numbered("w", model.p)]
     return Model.define(
         list(sp.Matrix(model.x) + T * (model.drift + model.diffusion * sp.Matrix(v))),
         list(model.signal + sp.Matrix(w)),

@@ -23,7 +23,7 @@ from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.known import Stepwise
-from kfcourse.symbolic.model import OF_A_VARIANT, Model
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -207,20 +207,6 @@ class JumpModel:
         texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
         pairs = zip(self.names, texts, strict=True)
         return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in pairs)})"
-
-
-def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
-    """The model of a table such as [variants.53], or of one with `modes`."""
-    if "modes" not in given:
-        if spare := sorted({"transition", "first"} & set(given)):
-            raise ModelError(f"`{spare[0]}` is of a model with `modes`, and there are none")
-        return Model.of_table(given)
-    if missing := {"state", "meter", "transition"} - set(given):
-        raise ModelError(
-            f"a model with `modes` has no {' and no '.join(sorted(missing))}: give what holds in "
-            "all modes, and `transition`, a matrix of probabilities whose rows sum to 1"
-        )
-    return JumpModel.define(**{key: given[key] for key in given if key not in OF_A_VARIANT})
 
 
 def _tables(modes: Any) -> dict[str, dict[str, Any]]:

@@ -203,9 +203,3 @@ def test_where_nobody_finds_the_place_of_a_jump_there_may_be_one(condition):
 def test_something_must_be_random(state, meter, laws, problem):
     problems = nothing_random(Model.define(state, meter, {"e": 0} if "e*" in state else {}, **laws))
     assert problem in problems and bool(problem) == bool(problems)
-
-
-@pytest.mark.parametrize("given", [5, {}, {"state": "x + v"}])
-def test_a_table_that_is_no_model_is_refused(given):
-    with pytest.raises(ModelError, match="expected a table with state and meter"):
-        Model.of_table(given)
