@@ -35,7 +35,6 @@ H = sp.Symbol("length of a sub-step", positive=True)
 SMALL = sp.Rational(1, 50)  # |u| below which phi is its series, to 1e-13 of it
 FEWEST, MOST = 2, 512  # sub-steps between two measurements
 ERROR = 10  # times the accuracy: of the predicted mean and deviation of any trajectory
-EASY = 0.1  # of this error, with which the next interval begins with half as many
 
 
 def normal_step(model: Model) -> Model:
@@ -69,15 +68,14 @@ class Underway(NamedTuple):
         At the last measurement.
     ahead, coarse : State
         A sub-step before the next one; and a sub-step of twice the length before it.
-    substeps, enough : int
-        From one to the other; of the next interval to begin with.
+    substeps : int
+        From one to the other.
     """
 
     posterior: PointMass
     ahead: State
     coarse: State
     substeps: int
-    enough: int
 
     @property
     def error(self) -> Array:
@@ -135,8 +133,8 @@ def by_substeps(
             state = inner.step(state, np.full((len(start.posterior.mean), 1), np.nan))
         return state
 
-    def ahead(k: int, start: State, enough: int) -> Underway:
-        coarse, substeps = None, enough
+    def ahead(k: int, start: State) -> Underway:
+        coarse, substeps = None, FEWEST
         while substeps <= MOST:
             try:
                 fine = foreseen(k, start, substeps)
@@ -145,15 +143,13 @@ def by_substeps(
             if coarse and fine:
                 error = doubt * apart(coarse.predicted, fine.predicted, model.angles.x)
                 if error.max() <= ERROR * accuracy:
-                    easy = error.max() < EASY * ERROR * accuracy
-                    enough = max(substeps // (4 if easy else 2), FEWEST)
-                    return Underway(start.memory, fine, coarse, substeps, enough)
+                    return Underway(start.memory, fine, coarse, substeps)
             coarse, substeps = fine, 2 * substeps
         raise Unresolved("", reason=f"{MOST} sub-steps to the next measurement are too few")
 
     def init(runs: int) -> State:
         start = exact.init(runs)
-        return start._replace(memory=Underway(start.memory, start, start, 0, FEWEST))
+        return start._replace(memory=Underway(start.memory, start, start, 0))
 
     def step(state: State, y: Array) -> State:
         k, memory = state.step, state.memory
@@ -167,7 +163,7 @@ def by_substeps(
             )
             error = now.memory.error + doubt * apart(rough.posterior, now.posterior, model.angles.x)
             now = now._replace(memory=now.memory._replace(error=error))
-            after = ahead(k + 1, now, memory.enough)
+            after = ahead(k + 1, now)
         except Unresolved as why:
             raise Unresolved(
                 f"step {k} of {model}: {why.parts['reason']}; leave the exact filter out"

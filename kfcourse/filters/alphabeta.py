@@ -26,6 +26,7 @@ import numpy as np
 
 from kfcourse.angles import difference
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.kalman import predict
 from kfcourse.laws import Array, Gaussian, any_missing, apply, symmetric, transpose
 from kfcourse.linear.system import linear_system
 from kfcourse.symbolic.model import Model
@@ -133,11 +134,8 @@ def alpha_beta(model: Model, alpha: float, beta: float) -> Filter:
         rest = np.eye(model.n) - K @ system.H
         cov = symmetric(rest @ prior.cov @ transpose(rest) + K @ system.R @ transpose(K))
         posterior = Gaussian(prior.mean + apply(K, innovation), cov)
-        predicted = Gaussian(
-            apply(system.A, posterior.mean), symmetric(system.A @ cov @ system.A.T + system.Q)
-        )
         progress = Progress(used + measured, np.where((used == 0) & measured, 0.0, age) + T)
-        return State(state.step + 1, posterior, predicted, progress)
+        return State(state.step + 1, posterior, predict(system, posterior), progress)
 
     return Filter("alpha-beta", model, init, step)
 

@@ -24,7 +24,6 @@ Without jumps they are `fos`, `fkp` and `fbp`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +31,7 @@ from kfcourse.errors import expect
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.multiple_models import (
+    Modes,
     corrected,
     expectations,
     mixture,
@@ -52,16 +52,6 @@ from kfcourse.symbolic.structure import Structure, expect_each
 
 # of the largest variance, that a law of zeta without width in a direction has a density
 RIDGE = 1e-12
-
-
-class Remembering(NamedTuple):
-    """What the filter remembers; the first three as of `multiple_models.Modes`, found anew from the
-    last at each step."""
-
-    probability: Array
-    expected: Array
-    predicted: tuple[Gaussian, ...]
-    kept: Remembered = Remembered()
 
 
 def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Design:
@@ -117,7 +107,7 @@ def _remembering(
         start = initial_state(model.modes[0])(runs)
         expected = np.tile(model.first, (runs, 1))
         return start._replace(
-            memory=Remembering(expected, expected, (start.predicted,) * len(structures))
+            memory=Modes(expected, expected, (start.predicted,) * len(structures))
         )
 
     def equations(state: State, y: Array) -> Equations:
@@ -127,7 +117,7 @@ def _remembering(
         of_modes, mu = corrected(before, measured, y)
         posterior = mixture(of_modes, mu)
         seen = _seen(y, before.expected, measured) if memory.measurements else y
-        kept = before.kept.and_now(posterior.mean, seen, memory, ())
+        kept = (before.kept or Remembered()).and_now(posterior.mean, seen, memory, ())
         zeta = kept.regressor
         constant, unit = np.zeros((len(y), 1)), np.eye(zeta.shape[1])
 
@@ -155,7 +145,7 @@ def _remembering(
             k + 1,
             posterior,
             mixture(following, expected),
-            Remembering(mu, expected, tuple(following), kept),
+            Modes(mu, expected, tuple(following), kept),
         )
 
     return Design(f"{name}-jump-{structures[0].name}", model.modes[0], equations, start=init)

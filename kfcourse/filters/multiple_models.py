@@ -88,11 +88,14 @@ class Modes(NamedTuple):
         c, probabilities before the next one.
     predicted : tuple of M Gaussian
         Law of the next state in each mode: mean (runs, n), cov (..., n, n).
+    kept : Remembered or None
+        The measurements or estimates that a designed filter goes by (`jump_optimal`).
     """
 
     probability: Array
     expected: Array
     predicted: tuple[Gaussian, ...]
+    kept: Any = None
 
 
 def imm(

@@ -107,7 +107,7 @@ def test_kalmans_filter_where_the_object_is_linear():
             law(pointmass(model), y), law(aof(linearised(model)), y), strict=True
         ):
             assert_allclose(ours, kalman, rtol=0, atol=2e-5)
-    # two of them would do
+    # two of them would do, four tell
     assert {state.memory.substeps for state in states(pointmass(model), y)[1:]} == {4}
 
 
