@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product as cartesian
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -26,11 +26,8 @@ MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 REMEDY = "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
 
 
-class LogLikelihood(Protocol):
-    """(y (..., p), x (..., n)) -> log p(y | x) (...); of a model that depends on the step, at step
-    k."""
-
-    def __call__(self, y: Array, x: Array, k: int | None = None) -> Array: ...
+# (y (..., p), x (..., n)) -> ln p(y | x) (...); the step follows where the model depends on it.
+LogLikelihood: TypeAlias = Callable[..., Array]
 
 
 class ScalarFormulas(NamedTuple):
@@ -69,10 +66,11 @@ def likelihood(model: Model) -> LogLikelihood:
     mean, cov = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
     law = model.compiled([model.x], [list(mean), cov])
     if model.p > 1 and _singular(law, model):
-        raise _no_density(
+        raise ModelError(
             f"{list(model.meter_equation)}: the noises of these components depend on one another, "
             f"so a combination of them has "
-            f"no noise and there is no likelihood density; leave a component out, or {REMEDY}"
+            f"no noise and there is no likelihood density; leave a component out, or {REMEDY}",
+            "no_density",
         )
 
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
@@ -115,15 +113,17 @@ def _law(
     of a density."""
     B = equation.jacobian(sp.Matrix(noise))
     if B.has(*noise) or decides(equation, noise):
-        raise _no_density(
+        raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple density; "
-            f"{REMEDY}"
+            f"{REMEDY}",
+            "no_density",
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     if cov.subs(model.values).is_zero_matrix:
-        raise _no_density(
-            f"{list(equation)}: no noise enters the {what}, so there is no density; {REMEDY}"
+        raise ModelError(
+            f"{list(equation)}: no noise enters the {what}, so there is no density; {REMEDY}",
+            "no_density",
         )
     return mean, cov
 
@@ -147,7 +147,3 @@ def has_object_noise(model: Model) -> bool:
         model.state_noise.cov
     )
     return not B.subs(model.values).is_zero_matrix
-
-
-def _no_density(message: str) -> ModelError:
-    return ModelError(message, "no_density")

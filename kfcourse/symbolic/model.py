@@ -289,10 +289,6 @@ class Model:
 
         Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
         """
-        return aligned(self.lines(values, indexed))
-
-    def lines(self, values: bool = True, indexed: bool = False) -> list[str]:
-        """The lines of `latex`."""
         x, v, w = (
             [sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in group]
             for group in (self.x, self.v, self.w)
@@ -321,7 +317,7 @@ class Model:
                 rf"{sp.latex(name)} &= {number_latex(float(value))}"
                 for name, value in self.values.items()
             ] + self.known.latex("t" if self.between is None else "t_{k}")
-        return lines
+        return aligned(lines)
 
     def __repr__(self) -> str:
         rate = "{}'" if self.between is None else "d{}/dt"
