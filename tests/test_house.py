@@ -205,14 +205,14 @@ ROOMS = {
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
     "kfcourse/continuous": 9_920,
-    "kfcourse/filters": 30_710,
+    "kfcourse/filters": 30_680,
     "kfcourse/lab": 19_570,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
-    "kfcourse/symbolic": 20_840,
+    "kfcourse/symbolic": 20_800,
     "tests": 185_970,
 }
 OF_LAYOUT = {
