@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_800,
-    "tests": 185_970,
+    "tests": 185_160,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -114,6 +114,7 @@ def test_kalmans_filter_where_the_object_is_linear():
 def test_benes_filter_and_the_order_of_a_sub_step():
     model = benes(interval=1.0)
     y = simulate(model, 10, 5, 3).y
+    y[2, 0] = np.nan
     closed = run(benes_filter(model), y)
     errors = []
     for accuracy in (1e-3, 1e-4):
@@ -125,6 +126,8 @@ def test_benes_filter_and_the_order_of_a_sub_step():
         stated = [state.memory.error for state in visited[1:]]
         assert (np.array(off) < np.array(stated)).all()
         errors.append((visited[0].memory.substeps, np.max(off)))
+    logs = [likelihood(filter_, y)[1:] for filter_ in (benes_filter(model), pointmass(model, 1e-4))]
+    assert_allclose(*logs, rtol=0, atol=2 * np.max(stated))
     (few, first), (many, then) = errors
     assert then < 2 * first * (few / many) ** 2
 
