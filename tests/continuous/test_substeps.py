@@ -125,6 +125,8 @@ def test_benes_filter_and_the_order_of_a_sub_step():
         ]
         stated = [state.memory.error for state in visited[1:]]
         assert (np.array(off) < np.array(stated)).all()
+        spread = np.array([state.posterior.cov for state in visited[1:]]) / closed.cov[1:]
+        assert (np.abs(np.sqrt(spread)[..., 0, 0] - 1) < np.array(stated)).all()
         errors.append((visited[0].memory.substeps, np.max(off)))
     logs = [likelihood(filter_, y)[1:] for filter_ in (benes_filter(model), pointmass(model, 1e-4))]
     assert_allclose(*logs, rtol=0, atol=2 * np.max(stated))
