@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_positive
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import Entries, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
@@ -216,7 +216,7 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
     discrete filters run on it.
     """
     expect(model, ContinuousModel, "to_discrete")
-    check_step(step)
+    expect_positive(step=step)
     T = sp.Rational(str(float(step)))
     v = [fresh(name, model.taken) for name in numbered("v", model.diffusion.cols)]
     w = [fresh(name, model.taken) for name in numbered("w", model.p)]
@@ -248,12 +248,3 @@ def compiled(
         if model.time is None
         else lambda t, *arrays: function(*arrays, np.array([t]))
     )
-
-
-def check_step(step: float) -> None:
-    if (
-        isinstance(step, bool)
-        or not isinstance(step, int | float | np.integer | np.floating)
-        or not (np.isfinite(step) and step > 0)
-    ):
-        raise ValueError(f"the step must be a positive number of time units, got {step!r}")

@@ -356,7 +356,7 @@ def test_bad_models(arguments, settings, message):
         ContinuousModel.define(*arguments, **settings)
 
 
-@pytest.mark.parametrize("step", [0, -0.1, float("nan"), float("inf"), "0.1", True, None])
+@pytest.mark.parametrize("step", [0, -0.1, float("nan"), float("inf")])
 def test_bad_steps(step):
     model = parabola()
     for use in (
@@ -364,7 +364,7 @@ def test_bad_steps(step):
         lambda: simulate(model, step, 1, 1, 0),
         lambda: extended_kalman_bucy(model, step),
     ):
-        with pytest.raises(ValueError, match="positive number of time units"):
+        with pytest.raises(ValueError, match="step must be positive and finite"):
             use()
 
 
