@@ -204,7 +204,7 @@ ROOMS = {
     "exercises/notebooks": 8_050,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
-    "kfcourse/continuous": 9_870,
+    "kfcourse/continuous": 9_830,
     "kfcourse/filters": 30_660,
     "kfcourse/lab": 19_570,
     "kfcourse/linear": 5_570,
@@ -212,7 +212,7 @@ ROOMS = {
     "kfcourse/pages": 9_560,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
-    "kfcourse/symbolic": 20_800,
+    "kfcourse/symbolic": 20_780,
     "tests": 185_220,
 }
 OF_LAYOUT = {

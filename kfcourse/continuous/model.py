@@ -13,7 +13,7 @@ import sympy as sp
 from kfcourse.errors import expect, expect_positive
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import Entries, compile_function
-from kfcourse.symbolic.formula import check_name, symbol
+from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
     Formula,
@@ -111,12 +111,7 @@ class ContinuousModel:
                 f"{n} drift formula(s), {len(g)} row(s) of diffusion and the state symbols "
                 f"{names}: one each is needed"
             )
-        twice = sorted({name for name in names if names.count(name) > 1 or name in values})
-        if twice:
-            raise ModelError(
-                f"{', '.join(twice)} named twice: state and parameters need different names"
-            )
-        x = tuple(symbol(check_name(name)) for name in names)
+        x = tuple(symbol(name) for name in names)
         known = {"t": symbol("t")} | {name: symbol(name) for name in values} | by_name(x)
         N = law("noise_density", {"variance": noise_density}, len(S)).cov
         # rounding of eigvalsh
@@ -137,7 +132,7 @@ class ContinuousModel:
             law("spectral_density", {"variance": spectral_density}, noises).cov,
             N,
         )
-        # its checks are this model's too: real and finite, and the signal depends on the state
+        # its checks are this model's too: names, real and finite numbers, a signal of the state
         to_discrete(model, 1.0)
         return model
 

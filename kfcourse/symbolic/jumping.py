@@ -155,11 +155,6 @@ class JumpModel:
         return self.modes[0].angles
 
     @property
-    def measured(self) -> list[str]:
-        """Names of the measurement's components."""
-        return self.modes[0].measured
-
-    @property
     def steps(self) -> float:
         """For how many steps the modes' inputs have values."""
         return min(self.chain_of_step.known.steps, *(mode.known.steps for mode in self.modes))
