@@ -24,7 +24,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, difference
-from kfcourse.filters.base import Filter, State, drawn_from_memory
+from kfcourse.filters.base import Filter, State
 from kfcourse.filters.exact.laws import printed
 from kfcourse.filters.exact.pointmasses import Exact, PointMass, Unresolved
 from kfcourse.laws import Array, Gaussian
@@ -170,7 +170,7 @@ def by_substeps(
             ) from None
         return State(k + 1, now.posterior, after.ahead.predicted, after)
 
-    return Filter("aof-exact", model, init, step, evidence=evidence, drawn=drawn_from_memory)
+    return Filter("aof-exact", model, init, step, evidence=evidence, drawn=True)
 
 
 def evidence(before: State, y: Array, after: State) -> Array:

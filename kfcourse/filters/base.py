@@ -46,8 +46,6 @@ Advance: TypeAlias = Callable[[State, Vectors], State]
 # ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0 where
 # it is missing.
 Evidence: TypeAlias = Callable[[State, Vectors, State], Array]
-# So many states from each posterior, (number, runs, n), and their modes (number, runs).
-Draw: TypeAlias = Callable[[State, int, np.random.Generator], tuple[Array, Array]]
 # From the filter's states after each measurement, and y: what so many of these measurements tell, K
 # -> states.  Their laws are those given y_0, ..., y_{K-1}, that of step K - 1 first and of step 0
 # last, each found when it is asked for.  Their memory may tell how good they are,
@@ -85,8 +83,10 @@ class Filter:
     mixture : callable, optional
         Where what it expects of a measurement is a mixture of normal laws: the state before it to
         their weights (runs, M), and the M expectations.
-    drawn : Draw, optional
-        Where it is another law, and its posterior can be drawn from.
+    drawn : bool
+        Where it is another law: whether its memory has the posterior to draw from, `drawn(number,
+        rng)` -> so many states (number, runs, n) of each trajectory, and their modes (number,
+        runs).
     """
 
     name: str
@@ -98,17 +98,11 @@ class Filter:
     evidence: Evidence | None = None
     look_back: LookBack | None = None
     mixture: Callable[[State], tuple[Array, Sequence[Measurement]]] | None = None
-    drawn: Draw | None = None
+    drawn: bool = False
 
     def __post_init__(self) -> None:
         if self.model.angles.x:
             object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
-
-
-def drawn_from_memory(state: State, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """`Filter.drawn` of a filter whose memory holds the posterior."""
-    states, modes = state.memory.drawn(number, rng)
-    return states, modes
 
 
 def structure_of(filter_: Filter, what: str) -> Structure:

@@ -41,7 +41,7 @@ import numpy as np
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, drawn_from_memory, initial_state
+from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import (
     Array,
@@ -104,7 +104,7 @@ class Clouds:
         return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=self.part))
 
     def drawn(self, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        """As of `Filter`."""
+        """States of both clouds, and their modes: as of `Filter`."""
         assert self.x is not None and self.mode is not None  # there has been a measurement
         runs, _, size = self.mode.shape
         shape = (number, runs)
@@ -161,9 +161,8 @@ def particle(
     modes = model.modes if isinstance(model, JumpModel) else (model,)
     sampler = Sampler([*map(Mode.of, modes)], jumping, particles // 2, seed, guided)
     return Filter(
-        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence,
-        drawn=drawn_from_memory,
-    )  # fmt: skip
+        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, drawn=True
+    )
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, drawn_from_memory, initial_state
+from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.exact.columns import (
     ERROR,
     EVIDENCE,
@@ -175,7 +175,7 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         exact.step,
         evidence=_evidence,
         look_back=back,
-        drawn=drawn_from_memory,
+        drawn=True,
     )
 
 
