@@ -143,14 +143,12 @@ def test_a_vector_model_prints_every_component():
     assert (
         repr(model) == "Model(x1' = a*x1 + x2, x2' = v + x2, y1 = w1 + x1, y2 = w2 + 2*x2; a = 1/2)"
     )
-    equations = [
-        r"x_{1,k+1} &= a x_{1} + x_{2} \\",
-        r"x_{2,k+1} &= x_{2} + v \\",
-        r"y_{1,k} &= x_{1} + w_{1} \\",
-        r"y_{2,k} &= 2 x_{2} + w_{2}",
+    # the lines without and with values; more in tests/golden
+    assert model.latex().splitlines()[1:-1] == [
+        *model.latex(values=False).splitlines()[1:-2],
+        r"y_{2,k} &= 2 x_{2} + w_{2} \\",
+        "a &= 0.5",
     ]
-    assert model.latex(values=False).splitlines()[1:-1] == equations
-    assert model.latex().splitlines()[1:-1] == [*equations[:3], equations[3] + r" \\", "a &= 0.5"]
 
 
 def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
