@@ -199,7 +199,7 @@ class Model:
             for formula in equation:
                 place = f"the {what} equation, {formula!s:.100}, with these parameters"
                 try:
-                    check_numbers(place, sp.Matrix([formula.subs(self.values)]))
+                    check_numbers(place, formula.subs(self.values))
                 except TypeError:  # SymPy's
                     raise ModelError(f"{place}: it compares what has no real value") from None
 
