@@ -212,7 +212,7 @@ ROOMS = {
     "kfcourse/pages": 9_560,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
-    "kfcourse/symbolic": 20_780,
+    "kfcourse/symbolic": 20_770,
     "tests": 185_230,
 }
 OF_LAYOUT = {
