@@ -205,7 +205,7 @@ ROOMS = {
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
     "kfcourse/continuous": 9_830,
-    "kfcourse/filters": 30_450,
+    "kfcourse/filters": 30_440,
     "kfcourse/lab": 19_570,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
