@@ -41,14 +41,12 @@ def test_among_many_matrices_a_singular_broken_or_unknown_one_does_not_disturb_t
         assert_allclose(
             gain(cross, cov, broken=True)[others], expected[others], rtol=1e-10, atol=1e-10
         )
-    with pytest.raises(NegativeVariance):
-        gain(cross, -np.abs(cov))
 
 
 @pytest.mark.parametrize("cov", [[[-1.0]], [[1.0, 0.0], [0.0, -1.0]], [[[1.0]], [[-1e-300]]]])
 def test_a_negative_variance_is_refused(cov):
     cov = np.array(cov)
-    with pytest.raises(ValueError, match="must not be negative"):
+    with pytest.raises(NegativeVariance, match="must not be negative"):
         gain(np.ones((1, cov.shape[-1])), cov)
 
 
@@ -151,14 +149,6 @@ def test_large_means_do_not_cancel(rng):
     )
 
 
-@pytest.mark.parametrize("count", [8191, 8192, 8193, 20_000])
-def test_long_sums_are_cut_without_loss(rng, count):
-    column = rng.normal(size=(count, 1))
-    assert_allclose(
-        Scatter.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11
-    )
-
-
 def test_a_perfect_regression_leaves_no_negative_variance(rng):
     # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become
     # a variance below 0.
@@ -200,12 +190,3 @@ def test_the_log_density_is_the_normal_law_s_of_what_was_measured():
 )
 def test_a_covariance_is_one_in_any_units(cov, right):
     assert is_covariance(np.array(cov)) is right
-
-
-def test_products_of_a_random_root_are_covariances():
-    rng = np.random.default_rng(1)
-    for size in range(1, 8):
-        root = rng.standard_normal((size, max(size - 1, 1))) * 10.0 ** rng.uniform(
-            -20, 20, (size, 1)
-        )
-        assert is_covariance(root @ root.T)

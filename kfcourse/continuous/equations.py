@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from kfcourse.continuous.model import ContinuousModel, numbered
-from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.continuous.model import ContinuousModel
+from kfcourse.symbolic.reading import exact_matrix, fresh, normal_symbols, numbered
 
 
 def log_likelihood_rate(
@@ -76,12 +76,8 @@ def filter_equations(model: ContinuousModel, second_derivatives: bool = True) ->
 
     The second derivatives of S enter U times y - S, so without them U is U at y = S.
     """
-    n = model.n
-    z = sp.ImmutableMatrix([model.fresh(name) for name in numbered("z", n)])
-    D = sp.ImmutableMatrix(
-        n, n, lambda i, j: model.fresh("D" if n == 1 else f"D{min(i, j) + 1}{max(i, j) + 1}")
-    )
-    y = sp.ImmutableMatrix([model.fresh(name) for name in numbered("y", model.p)])
+    z, D = normal_symbols(model.n, "z", "D", model.taken)
+    y = sp.ImmutableMatrix([fresh(name, model.taken) for name in numbered("y", model.p)])
     at = dict(zip(model.x, z, strict=True))
     f, g, S = (
         sp.ImmutableMatrix(matrix.subs(at, simultaneous=True))

@@ -24,7 +24,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, difference
-from kfcourse.filters.base import Filter, State, drawn_from_memory
+from kfcourse.filters.base import Filter, State
 from kfcourse.filters.exact.laws import printed
 from kfcourse.filters.exact.pointmasses import Exact, PointMass, Unresolved
 from kfcourse.laws import Array, Gaussian
@@ -33,8 +33,7 @@ from kfcourse.symbolic.model import Model
 
 H = sp.Symbol("length of a sub-step", positive=True)
 SMALL = sp.Rational(1, 50)  # |u| below which phi is its series, to 1e-13 of it
-FEWEST, MOST = 2, 512  # sub-steps between two measurements
-EASY = 0.1  # of the accuracy, with which the next interval begins with half as many
+MOST = 512  # sub-steps between two measurements
 
 
 def normal_step(model: Model) -> Model:
@@ -68,15 +67,14 @@ class Underway(NamedTuple):
         At the last measurement.
     ahead, coarse : State
         A sub-step before the next one; and a sub-step of twice the length before it.
-    substeps, enough : int
-        From one to the other; of the next interval to begin with.
+    substeps : int
+        From one to the other.
     """
 
     posterior: PointMass
     ahead: State
     coarse: State
     substeps: int
-    enough: int
 
     @property
     def error(self) -> Array:
@@ -135,8 +133,8 @@ def by_substeps(
             state = inner.step(state, nothing)
         return state._replace(predicted=inner.step(state, nothing).posterior)
 
-    def ahead(k: int, start: State, enough: int) -> Underway:
-        coarse, substeps = None, enough
+    def ahead(k: int, start: State) -> Underway:
+        coarse, substeps = None, 1
         while substeps <= MOST:
             try:
                 fine = foreseen(k, start, substeps)
@@ -145,15 +143,13 @@ def by_substeps(
             if coarse and fine:
                 error = doubt * apart(coarse.predicted, fine.predicted, model.angles.x)
                 if error.max() <= accuracy:
-                    easy = error.max() < EASY * accuracy
-                    enough = max(substeps // (4 if easy else 2), FEWEST)
-                    return Underway(start.memory, fine, coarse, substeps, enough)
+                    return Underway(start.memory, fine, coarse, substeps)
             coarse, substeps = fine, 2 * substeps
         raise Unresolved("", reason=f"{MOST} sub-steps to the next measurement are too few")
 
     def init(runs: int) -> State:
         start = exact.init(runs)
-        return start._replace(memory=Underway(start.memory, start, start, 0, FEWEST))
+        return start._replace(memory=Underway(start.memory, start, start, 0))
 
     def step(state: State, y: Array) -> State:
         k, memory = state.step, state.memory
@@ -167,14 +163,14 @@ def by_substeps(
             )
             error = now.memory.error + doubt * apart(rough.posterior, now.posterior, model.angles.x)
             now = now._replace(memory=now.memory._replace(error=error))
-            after = ahead(k + 1, now, memory.enough)
+            after = ahead(k + 1, now)
         except Unresolved as why:
             raise Unresolved(
                 f"step {k} of {model}: {why.parts['reason']}; leave the exact filter out"
             ) from None
         return State(k + 1, now.posterior, after.ahead.predicted, after)
 
-    return Filter("aof-exact", model, init, step, evidence=evidence, drawn=drawn_from_memory)
+    return Filter("aof-exact", model, init, step, evidence=evidence, drawn=True)
 
 
 def evidence(before: State, y: Array, after: State) -> Array:

@@ -33,7 +33,7 @@ from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.known import Known
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments
-from kfcourse.symbolic.sides import gaussian_symbols
+from kfcourse.symbolic.reading import normal_symbols
 from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
 # trajectories that may be stiff: the implicit method takes some hundredths of a second each
@@ -77,15 +77,13 @@ def moment_equations(
     NoClosedForm
         A term without a closed-form mean, or, `linearised`, without a derivative.
     """
-    z, p = gaussian_symbols(model, "z", "p")
+    z, p = normal_symbols(model.n, "z", "p", model.taken)
     drift, B = model.between.drift, model.between.diffusion
     if approximation is linearised:
-        seen = linearised(_seen(model))
-        means = [
-            *sp.Matrix([seen["h"]]).subs(
-                dict(zip(gaussian_symbols(model, "m", "d")[0], z, strict=True)), simultaneous=True
-            )
-        ]
+        seen = _seen(model)
+        m, _ = normal_symbols(model.n, "m", "d", seen.taken)
+        at_mean = sp.Matrix([linearised(seen)["h"]])
+        means = [*at_mean.subs(dict(zip(m, z, strict=True)), simultaneous=True)]
     else:
         law = GaussianMoments(model.x, list(z), p)
         means = [law.mean_of(formula) for formula in (*drift, *(B * B.T))]

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_positive
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import Entries, compile_function
-from kfcourse.symbolic.formula import check_name, symbol
+from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
     Formula,
@@ -21,11 +21,12 @@ from kfcourse.symbolic.reading import (
     ModelError,
     Names,
     by_name,
-    exact_number,
     formula_list,
+    fresh,
     law,
+    numbered,
+    parameter_values,
     read,
-    table,
 )
 
 
@@ -100,35 +101,17 @@ class ContinuousModel:
         >>> ContinuousModel.define("-x + cos(t)", "1 + exp(-t)", "x")
         ContinuousModel(dx/dt = -x + xi*(1 + exp(-t)) + cos(t), y = x + n)
         """
-        given = table("parameters", parameters)
-        values = {
-            check_name(name): exact_number(f"parameter {name}", value)
-            for name, value in given.items()
-        }
-        f, S = (
-            formula_list(what, _plain(formulas))
-            for what, formulas in (("drift", drift), ("signal", signal))
-        )
+        values = parameter_values(parameters)
+        f, S = formula_list("drift", drift), formula_list("signal", signal)
         g = diffusion_rows(diffusion)
         n, noises = len(f), len(g[0])
-        names = [
-            *(
-                [symbols]
-                if isinstance(symbols, str)
-                else symbols or (["x"] if n == 1 else [f"x{i + 1}" for i in range(n)])
-            )
-        ]
+        names = [*([symbols] if isinstance(symbols, str) else symbols or numbered("x", n))]
         if len(names) != n or len(g) != n:
             raise ModelError(
                 f"{n} drift formula(s), {len(g)} row(s) of diffusion and the state symbols "
                 f"{names}: one each is needed"
             )
-        twice = sorted({name for name in names if names.count(name) > 1 or name in values})
-        if twice:
-            raise ModelError(
-                f"{', '.join(twice)} named twice: state and parameters need different names"
-            )
-        x = tuple(symbol(check_name(name)) for name in names)
+        x = tuple(symbol(name) for name in names)
         known = {"t": symbol("t")} | {name: symbol(name) for name in values} | by_name(x)
         N = law("noise_density", {"variance": noise_density}, len(S)).cov
         # rounding of eigvalsh
@@ -149,7 +132,7 @@ class ContinuousModel:
             law("spectral_density", {"variance": spectral_density}, noises).cov,
             N,
         )
-        # its checks are this model's too: real and finite, and the signal depends on the state
+        # its checks are this model's too: names, real and finite numbers, a signal of the state
         to_discrete(model, 1.0)
         return model
 
@@ -180,11 +163,10 @@ class ContinuousModel:
             else None
         )
 
-    def fresh(self, name: str) -> sp.Symbol:
-        """A symbol of that name, with underscores if the model uses it already."""
-        while name in self.parameters or name in by_name(self.x):
-            name += "_"
-        return symbol(name)
+    @property
+    def taken(self) -> set[str]:
+        """The names of its symbols."""
+        return {*self.parameters, *by_name(self.x)}
 
     def __repr__(self) -> str:
         xi = [symbol(name) for name in numbered("xi", self.diffusion.cols)]
@@ -195,15 +177,6 @@ class ContinuousModel:
         ]
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
         return f"ContinuousModel({', '.join(rows)}{'; ' if values else ''}{values})"
-
-
-def numbered(name: str, size: int) -> list[str]:
-    return [name] if size == 1 else [f"{name}{i + 1}" for i in range(size)]
-
-
-def _plain(formulas: Any) -> Any:
-    """A matrix as a list: SymPy's immutable matrices are expressions, too."""
-    return list(formulas) if isinstance(formulas, sp.MatrixBase) else formulas
 
 
 def diffusion_rows(diffusion: Any) -> list[list[Formula]]:
@@ -238,10 +211,10 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
     discrete filters run on it.
     """
     expect(model, ContinuousModel, "to_discrete")
-    check_step(step)
+    expect_positive(step=step)
     T = sp.Rational(str(float(step)))
-    v = [model.fresh(name) for name in numbered("v", model.diffusion.cols)]
-    w = [model.fresh(name) for name in numbered("w", model.p)]
+    v = [fresh(name, model.taken) for name in numbered("v", model.diffusion.cols)]
+    w = [fresh(name, model.taken) for name in numbered("w", model.p)]
     return Model.define(
         list(sp.Matrix(model.x) + T * (model.drift + model.diffusion * sp.Matrix(v))),
         list(model.signal + sp.Matrix(w)),
@@ -270,12 +243,3 @@ def compiled(
         if model.time is None
         else lambda t, *arrays: function(*arrays, np.array([t]))
     )
-
-
-def check_step(step: float) -> None:
-    if (
-        isinstance(step, bool)
-        or not isinstance(step, int | float | np.integer | np.floating)
-        or not (np.isfinite(step) and step > 0)
-    ):
-        raise ValueError(f"the step must be a positive number of time units, got {step!r}")

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.continuous.model import ContinuousModel, check_step, compiled
-from kfcourse.errors import expect, expect_sizes
+from kfcourse.continuous.model import ContinuousModel, compiled
+from kfcourse.errors import expect, expect_positive, expect_sizes
 from kfcourse.laws import Array, apply, square_root
 from kfcourse.montecarlo.designing import NotFinite
 
@@ -49,7 +49,7 @@ def simulate(
         The trajectories became infinite.
     """
     expect(model, ContinuousModel, "simulate")
-    check_step(step)
+    expect_positive(step=step)
     expect_sizes(steps=steps, runs=runs, substeps=substeps)
     rng, dt = np.random.default_rng(seed), step / substeps
     formulas = [list(model.drift), model.diffusion, list(model.signal)]

@@ -23,7 +23,7 @@ from kfcourse.angles import on_circle
 from kfcourse.continuous.equations import symmetrised_drift
 from kfcourse.continuous.exact import by_substeps
 from kfcourse.continuous.integration import at_rest, flow_of, moment_equations, rates_of
-from kfcourse.continuous.model import diffusion_rows, numbered
+from kfcourse.continuous.model import diffusion_rows
 from kfcourse.errors import expect_sizes
 from kfcourse.filters.base import Filter
 from kfcourse.laws import (
@@ -41,8 +41,8 @@ from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.equations import Equation
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Known
-from kfcourse.symbolic.model import OF_A_VARIANT, Model
-from kfcourse.symbolic.reading import Formula, Formulas, ModelError, Names, by_name, read
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import Formula, Formulas, ModelError, Names, by_name, numbered, read
 from kfcourse.symbolic.structure import Structure, of_steps
 from kfcourse.symbolic.typesetting import joined
 from kfcourse.symbolic.writing import formula_latex
@@ -280,9 +280,3 @@ def sampled(
     for k in range(len(known.inputs.get("t", ()))):
         clock(known, k)
     return model
-
-
-def sampled_of_table(table: Mapping[str, Any]) -> Model:
-    """The model of a table with `drift` and `diffusion`: its keys are the arguments of `sampled`,
-    but for title and steps."""
-    return sampled(**{key: value for key, value in table.items() if key not in OF_A_VARIANT})

@@ -25,7 +25,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.angles import difference
+from kfcourse.errors import expect_positive
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.kalman import predict
 from kfcourse.laws import Array, Gaussian, any_missing, apply, symmetric, transpose
 from kfcourse.linear.system import linear_system
 from kfcourse.symbolic.model import Model
@@ -34,11 +36,7 @@ from kfcourse.symbolic.reading import ModelError
 
 def steady_alpha(index: float) -> float:
     """alpha of the stationary alpha-beta filter with the tracking index Lambda > 0."""
-    if not (np.isfinite(index) and index > 0):
-        raise ValueError(
-            f"the tracking index noise_sd T^2 / measurement_sd must be positive and finite, got "
-            f"{index}"
-        )
+    expect_positive(index=index)
     # s = sqrt(1 - alpha) solves s^2 - (2 + Lambda/2) s + 1 = 0; 1 - s without cancellation
     rest = (np.sqrt(index**2 + 8 * index) - index) / 4
     return float(rest * (2 - rest))
@@ -46,19 +44,15 @@ def steady_alpha(index: float) -> float:
 
 def steady_beta(alpha: float) -> float:
     """beta = 2 (2 - alpha) - 4 sqrt(1 - alpha), of the stationary filter with this alpha."""
-    return 2 * (_between(alpha) / (1 + np.sqrt(1 - alpha))) ** 2
+    if not 0 < alpha < 1:
+        raise ValueError(f"alpha of a stationary filter lies between 0 and 1, got {alpha}")
+    return float(2 * (alpha / (1 + np.sqrt(1 - alpha))) ** 2)
 
 
 def tracking_index(alpha: float) -> float:
     """Lambda = beta / sqrt(1 - alpha), the tracking index that leads to this alpha; the inverse of
     `steady_alpha`."""
     return steady_beta(alpha) / float(np.sqrt(1 - alpha))
-
-
-def _between(alpha: float) -> float:
-    if not 0 < alpha < 1:
-        raise ValueError(f"alpha of a stationary filter lies between 0 and 1, got {alpha}")
-    return float(alpha)
 
 
 class Progress(NamedTuple):
@@ -133,11 +127,8 @@ def alpha_beta(model: Model, alpha: float, beta: float) -> Filter:
         rest = np.eye(model.n) - K @ system.H
         cov = symmetric(rest @ prior.cov @ transpose(rest) + K @ system.R @ transpose(K))
         posterior = Gaussian(prior.mean + apply(K, innovation), cov)
-        predicted = Gaussian(
-            apply(system.A, posterior.mean), symmetric(system.A @ cov @ system.A.T + system.Q)
-        )
         progress = Progress(used + measured, np.where((used == 0) & measured, 0.0, age) + T)
-        return State(state.step + 1, posterior, predicted, progress)
+        return State(state.step + 1, posterior, predict(system, posterior), progress)
 
     return Filter("alpha-beta", model, init, step)
 

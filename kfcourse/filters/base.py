@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -40,46 +40,18 @@ class State(NamedTuple):
     expected: Measurement | None = None
 
 
-class Init(Protocol):
-    """The state of so many trajectories before the first measurement."""
-
-    def __call__(self, runs: int, /) -> State: ...
-
-
-class Advance(Protocol):
-    """Correct with y_k, (runs, p), then predict k + 1.  A trajectory whose y is NaN is not
-    corrected."""
-
-    def __call__(self, state: State, y: Vectors, /) -> State: ...
-
-
-class Evidence(Protocol):
-    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0
-    where it is missing."""
-
-    def __call__(self, before: State, y: Vectors, after: State, /) -> Array: ...
-
-
-class Draw(Protocol):
-    """So many states from each posterior, (number, runs, n), and their modes (number, runs)."""
-
-    def __call__(
-        self, state: State, number: int, rng: np.random.Generator, /
-    ) -> tuple[Array, Array]: ...
-
-
-class LookBack(Protocol):
-    """From the filter's states after each measurement, and y: what so many of these measurements
-    tell, K -> states.
-
-    Their laws are those given y_0, ..., y_{K-1}, that of step K - 1 first and of step 0 last, each
-    found when it is asked for. Their memory may tell how good they are, `discretisation_error()`,
-    (runs,), in the units of x.
-    """
-
-    def __call__(
-        self, states: Iterable[State], y: Vectors, /
-    ) -> Callable[[int], Iterator[State]]: ...
+# The state of so many trajectories before the first measurement.
+Init: TypeAlias = Callable[[int], State]
+# Correct with y_k, (runs, p), then predict k + 1.  A trajectory whose y is NaN is not corrected.
+Advance: TypeAlias = Callable[[State, Vectors], State]
+# ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0 where
+# it is missing.
+Evidence: TypeAlias = Callable[[State, Vectors, State], Array]
+# From the filter's states after each measurement, and y: what so many of these measurements tell, K
+# -> states.  Their laws are those given y_0, ..., y_{K-1}, that of step K - 1 first and of step 0
+# last, each found when it is asked for.  Their memory may tell how good they are,
+# `discretisation_error()`, (runs,), in the units of x.
+LookBack: TypeAlias = Callable[[Iterable[State], Vectors], Callable[[int], Iterator[State]]]
 
 
 @dataclass(frozen=True)
@@ -112,8 +84,10 @@ class Filter:
     mixture : callable, optional
         Where what it expects of a measurement is a mixture of normal laws: the state before it to
         their weights (runs, M), and the M expectations.
-    drawn : Draw, optional
-        Where it is another law, and its posterior can be drawn from.
+    drawn : bool
+        Where it is another law: whether its memory has the posterior to draw from, `drawn(number,
+        rng)` -> so many states (number, runs, n) of each trajectory, and their modes (number,
+        runs).
     """
 
     name: str
@@ -125,17 +99,11 @@ class Filter:
     evidence: Evidence | None = None
     look_back: LookBack | None = None
     mixture: Callable[[State], tuple[Array, Sequence[Measurement]]] | None = None
-    drawn: Draw | None = None
+    drawn: bool = False
 
     def __post_init__(self) -> None:
         if self.model.angles.x:
             object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
-
-
-def drawn_from_memory(state: State, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """`Filter.drawn` of a filter whose memory holds the posterior."""
-    states, modes = state.memory.drawn(number, rng)
-    return states, modes
 
 
 def structure_of(filter_: Filter, what: str) -> Structure:

@@ -2,51 +2,37 @@
 need.
 
 x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
-
-A meter whose noise enters nonlinearly but can be solved for, such as y = exp(x + w) or y =
-x*exp(w), has with w = omega(x, y) the density p(y | x) = phi(omega(x, y)) |d omega / dy|, phi that
-of N(m_w, D_w).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product as cartesian
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import Array, Gaussian, Measurement, log_density
 from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
-TINY = 1e-300  # in place of a variance of exactly 0
 # states on which formulas are tried; eigenvalue of correlations that is none
 TRIALS, ROUNDING = 50, 1e-12
-DIGITS = 1e-6  # of a noise's deviation, to which a solution must give the noise back
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
-Y = sp.Dummy("y", real=True)
 REMEDY = "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
 
 
-class LogLikelihood(Protocol):
-    """(y (..., p), x (..., n)) -> log p(y | x) (...); of a model that depends on the step, at step
-    k."""
-
-    def __call__(self, y: Array, x: Array, k: int | None = None) -> Array: ...
+# (y (..., p), x (..., n)) -> ln p(y | x) (...); the step follows where the model depends on it.
+LogLikelihood: TypeAlias = Callable[..., Array]
 
 
 class ScalarFormulas(NamedTuple):
     """Means and deviations of the next state and of the measurement, given x: formulas of x and
-    parameters.
-
-    Of a meter whose noise is solved for, those of y with ln p(y | x) = -(y - mean)^2 / (2
-    deviation^2) - ln(sqrt(2 pi) deviation): they contain y, the symbol `Y`.
-    """
+    parameters."""
 
     mean: sp.Expr
     deviation: sp.Expr
@@ -66,10 +52,6 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
     mean, variance = _law(
         model, "object", model.difference_equation("a density"), model.v, model.state_noise
     )
-    if omega := noise_of_meter(model):
-        z = (omega - model.meter_noise.mean[0]) / sp.Float(np.sqrt(model.meter_noise.cov[0, 0]))
-        deviation = 1 / sp.Abs(z.diff(Y))
-        return ScalarFormulas(mean[0], sp.sqrt(variance[0]), Y - z * deviation, deviation)
     meter, meter_variance = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
     return ScalarFormulas(mean[0], sp.sqrt(variance[0]), meter[0], sp.sqrt(meter_variance[0]))
 
@@ -81,67 +63,46 @@ def likelihood(model: Model) -> LogLikelihood:
     The law of a component that is an angle is wound around the circle: the densities of y and of y
     plus whole turns add up.
     """
-    if omega := noise_of_meter(model):
-        return _of_solved(model, omega)
-    law = _compiled(model, _law(model, "meter", model.meter_equation, model.w, model.meter_noise))
+    mean, cov = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
+    law = model.compiled([model.x], [list(mean), cov])
     if model.p > 1 and _singular(law, model):
-        raise _no_density(
+        raise ModelError(
             f"{list(model.meter_equation)}: the noises of these components depend on one another, "
             f"so a combination of them has "
-            f"no noise and there is no likelihood density; leave a component out, or {REMEDY}"
+            f"no noise and there is no likelihood density; leave a component out, or {REMEDY}",
+            "no_density",
         )
 
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
         mean, cov = law.at(k)(x)
-        innovation, missing = difference(y, mean, model.angles.y), np.isnan(y)
+        away, missing = difference(y, mean, model.angles.y), np.isnan(y)
         sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
-        either = missing[..., :, None] | missing[..., None, :]
-        if missing.any():
-            innovation, cov = (
-                np.where(missing, 0.0, innovation),
-                np.where(either, np.eye(model.p), cov),
-            )
+        of_zero = Measurement(np.zeros(model.p), cov, cov, cov)
 
-        # what is missing is counted once, in no turn, as N(0; 0, 1)
-        def of_present(turns: Array) -> Array:
-            return np.where(
-                (missing & (turns != 0)).any(axis=-1), -np.inf, log_normal(innovation + turns, cov)
-            )
+        def after(turns: Array) -> Array:
+            # what is missing is counted once, in no turn
+            twice = (missing & (turns != 0)).any(axis=-1)
+            return np.where(twice, -np.inf, log_density(of_zero, away + turns))
 
-        value = wound(of_present, sd, model.angles.y) + 0.5 * np.log(2 * np.pi) * missing.sum(
-            axis=-1
-        )
-        return np.where(missing.all(axis=-1), 0.0, value)
+        return wound(after, sd, model.angles.y)
 
     return log_likelihood
 
 
-def log_normal(innovation: Array, cov: Array) -> Array:
-    """ln N(innovation; 0, cov), (...), of innovations (..., p)."""
-    size = innovation.shape[-1]
-    # an innovation infinitely many sigmas away has log-density -inf
-    with np.errstate(over="ignore"):
-        if size == 1:
-            variance = np.maximum(cov[..., 0, 0], TINY)
-            return -0.5 * (innovation[..., 0] ** 2 / variance + np.log(2 * np.pi * variance))
-        square = (innovation * np.linalg.solve(cov, innovation[..., None])[..., 0]).sum(axis=-1)
-        return -0.5 * (square + np.linalg.slogdet(cov)[1] + size * np.log(2 * np.pi))
-
-
-def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) -> Array:
+def wound(density: Callable[[Array], Array], sd: Array, angles: Components) -> Array:
     """log of the density of angles: the sum over all turns (p,) of the density of what was measured
     plus these turns.
 
     Eight standard deviations (p,) are covered, and one turn at least.
     """
     if not angles:
-        return log_density(np.zeros(len(sd)))
+        return density(np.zeros(len(sd)))
     most = np.clip(np.ceil((8 * sd + np.pi) / TURN), 1, MOST_TURNS).astype(int)
     total = np.array(-np.inf)
     for numbers in cartesian(
         *(range(-most[i], most[i] + 1) if i in angles else (0,) for i in range(len(sd)))
     ):
-        total = np.logaddexp(total, log_density(TURN * np.array(numbers)))
+        total = np.logaddexp(total, density(TURN * np.array(numbers)))
     return total
 
 
@@ -152,38 +113,32 @@ def _law(
     of a density."""
     B = equation.jacobian(sp.Matrix(noise))
     if B.has(*noise) or decides(equation, noise):
-        raise _no_density(
+        raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple density; "
-            f"{REMEDY}"
+            f"{REMEDY}",
+            "no_density",
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     if cov.subs(model.values).is_zero_matrix:
-        raise _no_density(
-            f"{list(equation)}: no noise enters the {what}, so there is no density; {REMEDY}"
+        raise ModelError(
+            f"{list(equation)}: no noise enters the {what}, so there is no density; {REMEDY}",
+            "no_density",
         )
     return mean, cov
-
-
-def _compiled(model: Model, law: tuple[sp.MatrixBase, sp.MatrixBase]) -> Stepwise:
-    mean, cov = law
-    return model.compiled([model.x], [list(mean), cov])
 
 
 def _singular(law: Stepwise, model: Model) -> bool:
     """Whether the covariance is singular at all states tried: the determinant of long formulas
     takes SymPy minutes."""
     with np.errstate(all="ignore"):
-        cov = law.at(0)(_states(model))[1]
+        away = np.random.default_rng(0).standard_normal((TRIALS, model.n))
+        states = model.prior.mean + away * np.sqrt(np.diagonal(model.prior.cov))
+        cov = law.at(0)(states)[1]
         deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
         correlation = cov / (deviation[..., :, None] * deviation[..., None, :])
     good = np.isfinite(correlation).all(axis=(-2, -1))
     return not (np.linalg.eigvalsh(correlation[good])[..., 0] > ROUNDING).any()
-
-
-def _states(model: Model) -> Array:
-    away = np.random.default_rng(0).standard_normal((TRIALS, model.n))
-    return model.prior.mean + away * np.sqrt(np.diagonal(model.prior.cov))
 
 
 def has_object_noise(model: Model) -> bool:
@@ -192,51 +147,3 @@ def has_object_noise(model: Model) -> bool:
         model.state_noise.cov
     )
     return not B.subs(model.values).is_zero_matrix
-
-
-def noise_of_meter(model: Model) -> sp.Expr | None:
-    """omega(x, Y), the noise of a scalar meter in which it enters nonlinearly; None if it is linear
-    or not to be had.
-
-    SymPy solves; which of its solutions is the noise, trials tell.
-    """
-    if model.p != 1 or len(model.w) != 1 or model.timed or model.angles.y:
-        return None
-    w, equation = model.w[0], model.meter_equation[0].subs(model.values)
-    deviation = float(np.sqrt(model.meter_noise.cov[0, 0]))
-    if not (equation.diff(w).has(w) and deviation > 0):
-        return None
-    try:
-        solutions = sp.solve(equation - Y, w)
-    except NotImplementedError:
-        return None
-    states = _states(model).T
-    noises = model.meter_noise.mean + deviation * np.random.default_rng(1).standard_normal(TRIALS)
-    for solution in solutions:
-        try:
-            with np.errstate(all="ignore"):
-                y = sp.lambdify([*model.x, w], equation)(*states, noises)
-                back = sp.lambdify([*model.x, Y], solution)(*states, y)
-        # a solution that cannot be computed, such as Lambert's function
-        except (NameError, TypeError):
-            continue
-        if not solution.has(sp.I) and np.all(np.abs(back - noises) <= DIGITS * deviation):
-            return solution
-    return None
-
-
-def _of_solved(model: Model, omega: sp.Expr) -> LogLikelihood:
-    compiled = sp.lambdify([*model.x, Y], [omega, sp.log(sp.Abs(omega.diff(Y)))])
-    law = model.meter_noise
-
-    def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
-        with np.errstate(all="ignore"):  # y that no noise makes
-            noise, log_slope = compiled(*np.moveaxis(x, -1, 0), y[..., 0])
-            value = log_normal((noise - law.mean[0])[..., None], law.cov) + log_slope
-        return np.where(np.isnan(y[..., 0]), 0.0, np.where(np.isnan(value), -np.inf, value))
-
-    return log_likelihood
-
-
-def _no_density(message: str) -> ModelError:
-    return ModelError(message, "no_density")

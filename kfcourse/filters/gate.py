@@ -181,7 +181,7 @@ def gated(
         )
         return log_density(expected, np.where(beyond, np.nan, y)) + at_the_edge
 
-    # a way of its own to look back needs its own memories, not those of the gate
+    # what needs the filter's own memories does not go with those of the gate
     return replace(
         filter_,
         name=f"gated-{filter_.name}",
@@ -189,6 +189,8 @@ def gated(
         step=step,
         evidence=evidence,
         look_back=None,
+        mixture=None,
+        drawn=False,
     )
 
 

@@ -36,16 +36,9 @@ from kfcourse.symbolic.structure import Structure
 
 _z_i, _P_i = s.matrix(r"z^{(i)}", s.n, s.ONE), s.matrix(r"p^{(i)}", s.n, s.n)
 _z_next, _P_next = s.matrix(r"z^{(i+1)}", s.n, s.ONE), s.matrix(r"p^{(i+1)}", s.n, s.n)
-_h_i, _G_i, _F_i, _K_i = (
-    s.matrix(rf"{letter}^{{(i)}}", *shape)
-    for letter, shape in (
-        ("h", (s.p, s.ONE)),
-        ("G", (s.p, s.n)),
-        ("F", (s.p, s.p)),
-        ("K", (s.n, s.p)),
-    )
-)
-_R_i = s.matrix(r"R^{(i)}", s.p, s.p)
+_h_i, _G_i = s.matrix(r"h^{(i)}", s.p, s.ONE), s.matrix(r"G^{(i)}", s.p, s.n)
+_F_i, _R_i = s.matrix(r"F^{(i)}", s.p, s.p), s.matrix(r"R^{(i)}", s.p, s.p)
+_K_i = s.matrix(r"K^{(i)}", s.n, s.p)
 _at = r"(z^{(i)}, p^{(i)})"
 
 # One round of the correction; it starts from z^(0) = lambda, p^(0) = Psi.

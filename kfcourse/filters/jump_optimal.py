@@ -24,14 +24,13 @@ Without jumps they are `fos`, `fkp` and `fbp`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.errors import expect
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.multiple_models import (
+    Modes,
     corrected,
     expectations,
     mixture,
@@ -43,25 +42,14 @@ from kfcourse.filters.optimal_structure import (
     Memory,
     Remembered,
     checked_memory,
-    expected_where_missing,
 )
 from kfcourse.laws import Array, Gaussian, Measurement
+from kfcourse.symbolic.averaging import check_averaged
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, expect_each
 
 # of the largest variance, that a law of zeta without width in a direction has a density
 RIDGE = 1e-12
-
-
-class Remembering(NamedTuple):
-    """What the filter remembers; the first three as of `multiple_models.Modes`, found anew from the
-    last at each step."""
-
-    probability: Array
-    expected: Array
-    predicted: tuple[Gaussian, ...]
-    kept: Remembered = Remembered()
 
 
 def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Design:
@@ -107,17 +95,14 @@ def _remembering(
     """The construction.  A missing measurement is remembered as its prediction, the mean over the
     modes."""
     what = f"the logic-dynamic {name.upper()}"
-    expect(model, JumpModel, what)
-    model.without_state(what)
+    check_averaged(model, what)
     expect_each(structures, what)
-    if model.angles.x or model.angles.y:
-        raise ModelError(f"{what} takes no components that are angles")
 
     def init(runs: int) -> State:
         start = initial_state(model.modes[0])(runs)
         expected = np.tile(model.first, (runs, 1))
         return start._replace(
-            memory=Remembering(expected, expected, (start.predicted,) * len(structures))
+            memory=Modes(expected, expected, (start.predicted,) * len(structures))
         )
 
     def equations(state: State, y: Array) -> Equations:
@@ -126,8 +111,9 @@ def _remembering(
         measured = expectations(now, before)
         of_modes, mu = corrected(before, measured, y)
         posterior = mixture(of_modes, mu)
-        seen = _seen(y, before.expected, measured) if memory.measurements else y
-        kept = before.kept.and_now(posterior.mean, seen, memory, ())
+        h = sum(before.expected[:, i, None] * each.h for i, each in enumerate(measured))
+        seen = np.where(np.isnan(y), h, y)
+        kept = (before.kept or Remembered()).and_now(posterior.mean, seen, memory, ())
         zeta = kept.regressor
         constant, unit = np.zeros((len(y), 1)), np.eye(zeta.shape[1])
 
@@ -155,13 +141,7 @@ def _remembering(
             k + 1,
             posterior,
             mixture(following, expected),
-            Remembering(mu, expected, tuple(following), kept),
+            Modes(mu, expected, tuple(following), kept),
         )
 
     return Design(f"{name}-jump-{structures[0].name}", model.modes[0], equations, start=init)
-
-
-def _seen(y: Array, expected: Array, expectations: Sequence[Measurement]) -> Array:
-    """The measurement; where it is missing what all modes together expect of it."""
-    h = sum(expected[:, j, None] * measurement.h for j, measurement in enumerate(expectations))
-    return expected_where_missing(y, expectations[0]._replace(h=np.asarray(h)), ())

@@ -43,7 +43,6 @@ pi_ij deceives by some per cent; the other components follow by regression on th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -64,6 +63,7 @@ from kfcourse.laws import (
     transpose,
 )
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.jumping import probabilities as sums_to_one
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import product_rule
 from kfcourse.symbolic.structure import Structure, expect_each
@@ -88,11 +88,14 @@ class Modes(NamedTuple):
         c, probabilities before the next one.
     predicted : tuple of M Gaussian
         Law of the next state in each mode: mean (runs, n), cov (..., n, n).
+    kept : Remembered or None
+        The measurements or estimates that a designed filter goes by (`jump_optimal`).
     """
 
     probability: Array
     expected: Array
     predicted: tuple[Gaussian, ...]
+    kept: Any = None
 
 
 def imm(
@@ -126,12 +129,12 @@ def imm(
         Transitions that depend on more than three components of the state.
     """
 
-    def following(
+    def merged(
         predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components
     ) -> Gaussian:
         return predict(*mixture(laws, weights, angles))
 
-    return _one_law_a_mode("imm", structures, transition, probabilities, following)
+    return _with_modes("imm", structures, transition, probabilities, merged)
 
 
 def logic_dynamic(
@@ -145,47 +148,14 @@ def logic_dynamic(
     Arguments, result and errors as of `imm`.
     """
 
-    def following(
+    def merged(
         predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components
     ) -> Gaussian:
         return mixture([predict(*law) for law in laws], weights, angles)
 
     expect_each(structures, "logic_dynamic")
     name = f"aof-jump-{structures[0].name}"
-    return _one_law_a_mode(name, structures, transition, probabilities, following)
-
-
-def _one_law_a_mode(
-    name: str,
-    structures: Sequence[Structure],
-    transition: Chain,
-    probabilities: Array | None,
-    following: Callable[[Predict, Sequence[Gaussian], Array, Components], Gaussian],
-) -> Filter:
-    """A filter that merges what may lead to each mode by `following`: (the mode's tau, Theta; laws;
-    weights) -> prediction."""
-    links, first, model = _checked(name, structures, transition, probabilities)
-    angles = model.angles.x
-
-    def init(runs: int) -> State:
-        start, expected = initial_state(model)(runs), np.tile(first, (runs, 1))
-        return start._replace(
-            memory=Modes(expected, expected, (start.predicted,) * len(structures))
-        )
-
-    def step(state: State, y: Array) -> State:
-        memory, now = state.memory, [structure.at(state.step) for structure in structures]
-        laws, mu = corrected(memory, expectations(now, memory), y)
-        pi, leading = links(state.step, laws)
-        expected, weights = onward(mu, pi)
-        predicted = tuple(
-            following(structure.predict, [row[j] for row in leading], weights[:, :, j], angles)
-            for j, structure in enumerate(now)
-        )
-        law, ahead = mixture(laws, mu, angles), mixture(predicted, expected, angles)
-        return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
-
-    return _with_evidence(Filter(name, model, init, step), structures)
+    return _with_modes(name, structures, transition, probabilities, merged)
 
 
 def gpb2(
@@ -201,40 +171,74 @@ def gpb2(
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs,
     i first.
     """
-    links, first, model = _checked("gpb2", structures, transition, probabilities)
+    return _with_modes("gpb2", structures, transition, probabilities, None)
+
+
+def _with_modes(
+    name: str,
+    structures: Sequence[Structure],
+    transition: Chain,
+    probabilities: Array | None,
+    merged: Callable[[Predict, Sequence[Gaussian], Array, Components], Gaussian] | None,
+) -> Filter:
+    """A filter that merges what may lead to each mode by `merged`, (the mode's tau, Theta; laws;
+    weights) -> prediction, or, without it, pairs of modes after their correction."""
+    links, first, model = _checked(name, structures, transition, probabilities)
     angles, size = model.angles.x, len(structures)
+    copies = size if merged is None else 1  # before a measurement as if any mode had come before
 
     def init(runs: int) -> State:
-        start = initial_state(model)(runs)
-        # as if any mode had come before, the same law of each
-        pairs = np.tile(first / size, (runs, size))
-        return start._replace(
-            memory=Modes(np.tile(first, (runs, 1)), pairs, (start.predicted,) * size**2)
-        )
+        start, expected = initial_state(model)(runs), np.tile(first / copies, (runs, copies))
+        memory = Modes(np.tile(first, (runs, 1)), expected, (start.predicted,) * copies * size)
+        return start._replace(memory=memory)
 
     def step(state: State, y: Array) -> State:
         memory, now = state.memory, [structure.at(state.step) for structure in structures]
-        of_pairs, pairs = corrected(memory, expectations(now, memory), y)
-        pairs = pairs.reshape(len(y), size, size)
-        mu, weights = pairs.sum(axis=1), _shares(pairs)
-        laws = [mixture(of_pairs[j::size], weights[:, :, j], angles) for j in range(size)]
-        law = mixture(laws, mu, angles)
-        laws = [_where(mu[:, j] > 0, of_mode, law) for j, of_mode in enumerate(laws)]
+        laws, mu = corrected(memory, expectations(now, memory), y)
+        if merged is None:
+            laws, mu = _by_second(laws, mu.reshape(len(y), size, size), angles)
         pi, leading = links(state.step, laws)
-        predicted = tuple(
-            structure.predict(*law)
-            for row in leading
-            for structure, law in zip(now, row, strict=True)
-        )
-        expected = (mu[:, :, None] * pi).reshape(len(y), -1)
-        return State(
-            state.step + 1,
-            law,
-            mixture(predicted, expected, angles),
-            Modes(mu, expected, predicted),
-        )
+        if merged is None:
+            expected = (mu[:, :, None] * pi).reshape(len(y), -1)
+            predicted = tuple(
+                structure.predict(*law)
+                for row in leading
+                for structure, law in zip(now, row, strict=True)
+            )
+        else:
+            expected, weights = onward(mu, pi)
+            predicted = tuple(
+                merged(structure.predict, [row[j] for row in leading], weights[:, :, j], angles)
+                for j, structure in enumerate(now)
+            )
+        law, ahead = mixture(laws, mu, angles), mixture(predicted, expected, angles)
+        return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
 
-    return _with_evidence(Filter("gpb2", model, init, step), structures)
+    def expecting(before: State) -> tuple[Array, list[Measurement]]:
+        now = [structure.at(before.step) for structure in structures]
+        return before.memory.expected, expectations(now, before.memory)
+
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return modes_given(*expecting(before), y)[1]
+
+    return Filter(name, model, init, step, evidence=evidence, mixture=expecting)
+
+
+def _by_second(
+    laws: Sequence[Gaussian], pairs: Array, angles: Components
+) -> tuple[list[Gaussian], Array]:
+    """One law for each mode, and its probability (runs, M), from those of pairs of modes (runs, M,
+    M): what has the same second mode is merged."""
+    size, mu, weights = pairs.shape[-1], pairs.sum(axis=1), _shares(pairs)
+    of_modes = [mixture(laws[j::size], weights[:, :, j], angles) for j in range(size)]
+    estimate = mixture(of_modes, mu, angles)
+    return [
+        Gaussian(
+            np.where(mu[:, j, None] > 0, law.mean, estimate.mean),
+            np.where(mu[:, j, None, None] > 0, law.cov, estimate.cov),
+        )
+        for j, law in enumerate(of_modes)
+    ], mu
 
 
 def expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
@@ -249,27 +253,6 @@ def corrected(
     """The laws corrected with y, and their probabilities (runs, ...)."""
     laws = [correct(*pair, y) for pair in zip(memory.predicted, expected, strict=True)]
     return laws, modes_given(memory.expected, expected, y)[0]
-
-
-def _with_evidence(filter_: Filter, structures: Sequence[Structure]) -> Filter:
-    """The filter with what it expects of measurements, a mixture."""
-
-    def expected(before: State) -> tuple[Array, list[Measurement]]:
-        now = [structure.at(before.step) for structure in structures]
-        return before.memory.expected, expectations(now, before.memory)
-
-    def evidence(before: State, y: Array, after: State) -> Array:
-        return modes_given(*expected(before), y)[1]
-
-    return replace(filter_, evidence=evidence, mixture=expected)
-
-
-def _where(holds: Array, law: Gaussian, other: Gaussian) -> Gaussian:
-    """For each trajectory one of two laws."""
-    return Gaussian(
-        np.where(holds[:, None], law.mean, other.mean),
-        np.where(holds[:, None, None], law.cov, other.cov),
-    )
 
 
 def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
@@ -307,36 +290,17 @@ def _checked(
     jumping = transition if isinstance(transition, JumpModel) else None
     if probabilities is None:
         probabilities = np.full(size, 1.0 / size) if jumping is None else jumping.first
-    start = _probabilities("probabilities", probabilities, (size,))
+    start = sums_to_one("probabilities", probabilities, (size,))
     if jumping is not None and jumping.by_state:
         return by_state(jumping), start, first
     given = transition.transition_at if isinstance(transition, JumpModel) else transition
 
-    def pi_at(k: int) -> Array:
-        return _probabilities("transition", given(k) if callable(given) else given, (size, size))
-
-    constant = pi_at(0)
-
     def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
-        return pi_at(k) if callable(given) else constant, [[law] * size for law in laws]
+        pi = sums_to_one("transition", given(k) if callable(given) else given, (size, size))
+        return pi, [[law] * size for law in laws]
 
+    links(0, [])  # what is no chain is refused here
     return links, start, first
-
-
-def _probabilities(what: str, given: Array, shape: tuple[int, ...]) -> Array:
-    """The probabilities, whose rows sum to 1; ValueError if they are none."""
-    table = np.asarray(given, dtype=float)
-    if table.shape != shape:
-        raise ValueError(
-            f"{what} must have the shape {shape} for {shape[0]} mode(s), got {table.shape}"
-        )
-    total = table.sum(axis=-1, keepdims=True)
-    if not (np.isfinite(table).all() and table.min() >= 0 and np.allclose(total, 1.0, atol=1e-9)):
-        raise ValueError(
-            f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got "
-            f"{table.tolist()}"
-        )
-    return table / total
 
 
 def by_state(model: JumpModel) -> Links:

@@ -12,9 +12,9 @@ state and its measurement,
     x' = a(x, m_v + L s),  L L^T = D_v;     y = g(s) + e,   g(s) = b(x', m_w),   Cov(e) = R(s)
 
 and a step of Gauss and Newton, which is a correction with g and R taken for affine and constant at
-the last s, finds a normal law of s; some of them find the posterior's mode and width.  q is a wider
-law of Student's there, beside a part of N(0, I) itself.  The initial state is a noise, too: x_0 = m
-+ L s.
+the last s, finds a normal law of s; some of them, from s = 0, find a mode of the posterior and its
+width.  q is a wider one there, beside a part of N(0, I) itself, which bounds the weights.  The
+initial state is a noise, too: x_0 = m + L s.
 
 Of a model that jumps a particle is a state and a mode.  The next mode is drawn with probability in
 proportion to pi_ij(x) times the normal density of y_k that the proposal of mode j has left.
@@ -35,14 +35,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, drawn_from_memory, initial_state
+from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import (
     Array,
@@ -65,12 +64,9 @@ ROUNDS = 2
 SMALL = 1e-4  # step in s by which slopes are found, in standard deviations
 # width of a law of s: the root of a nearly singular covariance is right to as much
 NARROWEST = 1e-7
-# of Student's law around the mode, whose tails the posterior's must not exceed
-FREEDOM, WIDER = 4.0, 1.2
+WIDER = 1.2  # the law around the mode, whose tails the posterior's must not exceed
 PRIOR = 0.1  # share drawn from N(0, I) and of modes drawn by pi, for what a normal law does not see
-# of the search for the modes of x_0, in standard deviations
-STARTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-LARGEST = 1e150  # the squares of larger states are infinite
+LARGEST = 1e70  # variances by fourth powers of larger states are infinite
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +104,7 @@ class Clouds:
         return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=self.part))
 
     def drawn(self, number: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        """As of `Filter`."""
+        """States of both clouds, and their modes: as of `Filter`."""
         assert self.x is not None and self.mode is not None  # there has been a measurement
         runs, _, size = self.mode.shape
         shape = (number, runs)
@@ -133,8 +129,7 @@ def particle(
     Parameters
     ----------
     model : Model or JumpModel
-        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly, or can be
-        solved for.
+        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly.
     particles : int
         Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells
         how many count.
@@ -166,9 +161,8 @@ def particle(
     modes = model.modes if isinstance(model, JumpModel) else (model,)
     sampler = Sampler([*map(Mode.of, modes)], jumping, particles // 2, seed, guided)
     return Filter(
-        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence,
-        drawn=drawn_from_memory,
-    )  # fmt: skip
+        name, modes[0], sampler.init, sampler.step, slow=True, evidence=_evidence, drawn=True
+    )
 
 
 @dataclass(frozen=True)
@@ -204,18 +198,18 @@ class Sampler:
         pi = self.jumping.transition_of(x, k)
         return np.take_along_axis(pi, mode[..., None, None], axis=-2)[..., 0, :]
 
-    def ways(self, before: Clouds, shape: tuple[int, ...], k: int) -> tuple[Array, list[Any]]:
-        """Probabilities of the modes at step k, and of each how normal noises s make x_k and where
-        the search for s begins."""
+    def ways(
+        self, before: Clouds, shape: tuple[int, ...], k: int
+    ) -> tuple[Array, list[tuple[Callable[[Array], Array], int]]]:
+        """Probabilities of the modes at step k, and of each how standard normal s make x_k, and how
+        many they are."""
         if before.x is None or before.mode is None:
             prior = self.modes[0].model.prior
-            root, n = square_root(prior.cov), len(prior.mean)
-            start = np.tile(STARTS[:, None] / np.sqrt(n), (shape[0], 1, 1, 1, n))
-            draw = (lambda s: on_circle(prior.mean + s @ root.T, self.angles)), start
-            return np.broadcast_to(self.first, (*shape, len(self.modes))), [draw] * len(self.modes)
+            root = square_root(prior.cov)
+            way = lambda s: on_circle(prior.mean + s @ root.T, self.angles), len(root)
+            return np.broadcast_to(self.first, (*shape, len(self.modes))), [way] * len(self.modes)
         return self.chances(before.x, before.mode, k - 1), [
-            (partial(mode.moved, before.x, k=k - 1), np.zeros((*shape, 1, mode.noises)))
-            for mode in self.modes
+            (partial(mode.moved, before.x, k=k - 1), mode.noises) for mode in self.modes
         ]
 
     def drawn(
@@ -226,16 +220,16 @@ class Sampler:
         shape = (len(y), 2, self.size)
         pi, ways = self.ways(before, shape, k)
         states, logs, heights = [], [], []
-        for mode, (moved, start) in zip(self.modes, ways, strict=True):
-            s = rng.standard_normal((*shape, start.shape[-1]))
+        for mode, (moved, noises) in zip(self.modes, ways, strict=True):
+            s = rng.standard_normal((*shape, noises))
             log, height = np.zeros(shape), np.zeros(shape)
             if self.guided:
-                law, tells, height = mode.look(moved, start, y[:, None, None, None], k)
-                wide, log_of_wide = _wide(rng, law, shape)
+                law, tells, height = mode.look(moved, np.zeros_like(s), y[:, None, None], k)
+                wide, log_of_wide = _wide(rng, law)
                 s, log = np.where(tells[..., None], wide, s), np.where(tells, log_of_wide, log)
             states.append(moved(s))
             logs.append(log)
-            heights.append(np.broadcast_to(height, shape))
+            heights.append(height)
         seen, _ = _normalised(np.log(pi) + np.stack(heights, axis=-1))
         share = (1 - PRIOR) * seen + PRIOR * pi
         modes = _chosen(rng, share)
@@ -248,7 +242,7 @@ class Sampler:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             x, mode, logs = self.drawn(rng, memory, y, k)
             lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))
-            x = np.clip(np.nan_to_num(x), -LARGEST, LARGEST)
+            x = np.where(lost[..., None], self.modes[0].model.prior.mean, x)
             likelihoods = [each.log_likelihood(y[:, None, None], x, k) for each in self.modes]
             logs = np.where(lost, -np.inf, logs + np.choose(mode, likelihoods))
             weights, log_mean = _normalised(logs)
@@ -310,19 +304,14 @@ class Mode(NamedTuple):
         )
 
     def moved(self, x: Array, s: Array, k: int) -> Array:
-        """The states after step k, (..., n); `x` (..., n) itself, or for several s of each state
-        (..., J, r)."""
-        x = x if x.ndim == s.ndim else x[..., None, :]
-        shape = np.broadcast_shapes(x.shape[:-1], s.shape[:-1])
-        return on_circle(
-            np.broadcast_to(self.state(x, s, k), (*shape, x.shape[-1])), self.model.angles.x
-        )
+        """The states after step k, from states x (..., n) with noises s (..., r)."""
+        return on_circle(np.broadcast_to(self.state(x, s, k), x.shape), self.model.angles.x)
 
     def look(
         self, moved: Callable[[Array], Array], s: Array, y: Array, k: int
     ) -> tuple[Gaussian, Array, Array]:
-        """Normal laws of s (..., J, r) given y_k, searched for from s; whether y tells of s, (...);
-        ln p(y) by these laws."""
+        """Normal laws of s (..., r) given y_k, searched for from s; whether y tells of s, (...); ln
+        p(y) by these laws."""
         turning, still = self.model.angles.y, np.zeros(len(self.model.w))
 
         def slopes(function: Callable[[Array], Array], at: Array, width: float) -> Array:
@@ -344,35 +333,22 @@ class Mode(NamedTuple):
             )
             law = correct(Gaussian(np.zeros_like(s), np.eye(s.shape[-1])), seen, value)
             law = Gaussian(np.nan_to_num(law.mean, posinf=0.0, neginf=0.0), law.cov)
-        tells = (H != 0).any(axis=(-3, -2, -1)) & ~np.isnan(y).all(axis=(-2, -1))
-        heights = np.nan_to_num(log_density(seen, value), nan=-np.inf)
-        return law, tells, np.logaddexp.reduce(heights, axis=-1) - np.log(heights.shape[-1])
+        tells = (H != 0).any(axis=(-2, -1)) & ~np.isnan(y).all(axis=-1)
+        return law, tells, np.nan_to_num(log_density(seen, value), nan=-np.inf)
 
 
-def _wide(rng: np.random.Generator, law: Gaussian, shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """s (runs, 2, M/2, r) by a mixture of Student's laws around normal ones (..., J, r) and of N(0,
-    I), and ln N(s; 0, I) / q."""
-    J, r = law.mean.shape[-2:]
+def _wide(rng: np.random.Generator, law: Gaussian) -> tuple[Array, Array]:
+    """s (..., r) by a mixture of a wider normal law and of N(0, I), and ln N(s; 0, I) / q."""
+    shape, r = law.mean.shape[:-1], law.mean.shape[-1]
     cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + NARROWEST**2 * np.eye(r)
-    root = WIDER * np.linalg.cholesky(np.broadcast_to(cov, (*law.mean.shape, r)))
-    normal, which = rng.standard_normal((*shape, r)), rng.integers(J, size=(*shape, 1))
-    centre = np.take_along_axis(
-        np.broadcast_to(law.mean, (*shape, J, r)), which[..., None], axis=-2
-    )[..., 0, :]
-    width = np.take_along_axis(
-        np.broadcast_to(root, (*shape, J, r, r)), which[..., None, None], axis=-3
-    )[..., 0, :, :]
-    student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, shape))[..., None]
-    s = np.where((rng.random(shape) < PRIOR)[..., None], normal, centre + apply(width, student))
-    square = (apply(np.linalg.inv(root), s[..., None, :] - law.mean) ** 2).sum(axis=-1)
-    laws = -0.5 * (FREEDOM + r) * np.log1p(square / FREEDOM) - np.log(
-        np.diagonal(root, axis1=-2, axis2=-1)
-    ).sum(axis=-1)
+    root = WIDER * np.linalg.cholesky(cov)
+    normal, plain = rng.standard_normal(law.mean.shape), rng.random(shape) < PRIOR
+    s = np.where(plain[..., None], normal, law.mean + apply(root, normal))
+    square = (apply(np.linalg.inv(root), s - law.mean) ** 2).sum(axis=-1)
     # over (2 pi)^(-r/2)
-    laws += gammaln((FREEDOM + r) / 2) - gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM / 2)
+    log = -0.5 * square - np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
     standard = -0.5 * (s * s).sum(axis=-1)
-    mixed = np.logaddexp.reduce(laws, axis=-1) + np.log((1 - PRIOR) / J)
-    return s, standard - np.logaddexp(mixed, standard + np.log(PRIOR))
+    return s, standard - np.logaddexp(log + np.log(1 - PRIOR), standard + np.log(PRIOR))
 
 
 def _evidence(before: State, y: Array, after: State) -> Array:

@@ -8,7 +8,7 @@ and the formulas of the model that of the structural functions.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import sympy as sp
 
@@ -96,12 +96,3 @@ def in_numbers(
         taken = {state[0]: scalar(at)} | dict(zip(noises, exact_matrix(law.mean), strict=True))
         values[scalar(value)] = equation[0].subs(taken, simultaneous=True)
     return [(scalar(part.lhs), scalar(part.rhs, inverse).xreplace(values)) for part in equations]
-
-
-def needed(rules: Sequence[Rule], wanted: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Those of the rules that what is wanted needs."""
-    letters = set(wanted)
-    for left, right in reversed(rules):
-        if left in letters:
-            letters |= right.free_symbols
-    return {left: right for left, right in rules if left in letters}

@@ -50,7 +50,6 @@ from kfcourse.laws import (
     apply,
     correct,
     gain,
-    log_density,
     product,
     transpose,
     without_missing,
@@ -206,22 +205,12 @@ def adaptive(structure: Structure, window: float = 50.0) -> Filter:
 
     def step(state: State, y: Array) -> State:
         now, scale = structure.at(state.step), state.memory.scale
-        expected = now.measure(*state.predicted)
-        posterior = correct(state.predicted, trusted(expected, 1 / scale), y)
+        of_model = now.measure(*state.predicted)
+        expected = trusted(of_model, 1 / scale)
+        posterior = correct(state.predicted, expected, y)
         present = (~np.isnan(y)).sum(axis=-1)
-        square = residual_square(expected, state.predicted, posterior, y) / np.maximum(present, 1)
+        square = residual_square(of_model, state.predicted, posterior, y) / np.maximum(present, 1)
         learnt = np.where(present > 0, scale + (square - scale) / window, scale)
-        return State(state.step + 1, posterior, now.predict(*posterior), Learnt(learnt))
+        return State(state.step + 1, posterior, now.predict(*posterior), Learnt(learnt), expected)
 
-    def evidence(before: State, y: Array, after: State) -> Array:
-        expected = structure.at(before.step).measure(*before.predicted)
-        return log_density(trusted(expected, 1 / before.memory.scale), y)
-
-    return Filter(
-        f"adaptive-{structure.name}",
-        structure.model,
-        init,
-        step,
-        structure=structure,
-        evidence=evidence,
-    )
+    return Filter(f"adaptive-{structure.name}", structure.model, init, step, structure=structure)

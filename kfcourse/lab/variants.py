@@ -11,9 +11,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from kfcourse.continuous.sampling import sampled_of_table
+from kfcourse.continuous.sampling import sampled
 from kfcourse.errors import expect_sizes
-from kfcourse.symbolic.jumping import JumpModel, model_of_table
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model, nothing_random
 from kfcourse.symbolic.reading import shown
 
@@ -201,8 +201,10 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
     moves = not {"drift", "diffusion"}.isdisjoint(table)
+    jumps = not {"modes", "transition", "first"}.isdisjoint(table)
     keys = KEYS - OF_STEPS | IN_TIME if moves else KEYS
     needed = {"meter", "drift", "diffusion"} if moves else {"meter", "state"}
+    needed |= {"modes", "transition"} if jumps else set()
     unknown, missing = sorted(set(table) - keys), sorted(needed - set(table))
     if unknown or missing:
         problem = (
@@ -210,7 +212,8 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
         )
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(keys))}")
     try:
-        model = sampled_of_table(table) if moves else model_of_table(table)
+        given = {key: table[key] for key in table if key not in ("title", "steps")}
+        model = (sampled if moves else JumpModel.define if jumps else Model.define)(**given)
         steps = table.get("steps", STEPS)
         expect_sizes(steps=steps)
     # FormulaError and ModelError are ValueErrors

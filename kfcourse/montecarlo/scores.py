@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from kfcourse.angles import Components, difference
-from kfcourse.filters.base import Draw, Filter, State
+from kfcourse.filters.base import Filter, State
 from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.ensemble import Ensemble, foretold
 from kfcourse.symbolic.structure import Structure
@@ -42,8 +42,8 @@ def scored(
     batch, the first of several, gives what is drawn a seed."""
     unknown = np.full(len(y), np.nan)
     log = chosen.evidence(before, y, after) if chosen.evidence else unknown
-    if chosen.drawn is not None:
-        expected = _expected(chosen.drawn, before, batch)
+    if chosen.drawn:
+        expected = _expected(before, batch)
         return log, crps_of_draws(y, expected, batch.model.angles.y)
     if chosen.mixture is not None:
         weights, laws = chosen.mixture(before)
@@ -59,13 +59,13 @@ def scored(
     return log, crps(errors, deviations, weights[:, None]).sum(axis=-1)
 
 
-def _expected(draw: Draw, before: State, batch: Ensemble) -> Array:
+def _expected(before: State, batch: Ensemble) -> Array:
     """Measurements drawn from what a filter expects, (DRAWS, runs, p)."""
     runs, key = len(before.posterior.mean), (*batch.seed.spawn_key, 1, before.step)
     seed = np.random.SeedSequence(batch.seed.entropy, spawn_key=key)
     drawn = None
     if before.step > 0:
-        x, mode = draw(before, DRAWS, np.random.default_rng(seed))
+        x, mode = before.memory.drawn(DRAWS, np.random.default_rng(seed))
         drawn = x.reshape(-1, x.shape[-1]), mode.ravel()
     y = foretold(replace(batch, runs=DRAWS * runs, seed=seed, wide=None), before.step, drawn)
     return y.reshape(DRAWS, runs, -1)

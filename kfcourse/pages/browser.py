@@ -26,7 +26,7 @@ import sympy as sp
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
-from kfcourse.filters.programs import Rule, array_name, in_numbers, needed, scalar
+from kfcourse.filters.programs import Rule, array_name, in_numbers, scalar
 from kfcourse.lab.short_names import LAB, Structures, title
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
@@ -119,13 +119,13 @@ def _loop(
     constants: Sequence[sp.Symbol],
     coefficients: Mapping[sp.Symbol, str],
 ) -> str:
-    """The loop that computes what is wanted; what nothing wanted needs is left out."""
+    """The loop that computes what is wanted."""
     by_letter = dict(rules)
     return javascript.loop(
         name,
         {array_name(letter): sp.Matrix([letter]) for letter in given if letter not in by_letter},
         {array_name(letter): sp.Matrix([letter]) for letter in wanted},
-        needed(rules, wanted),
+        dict(rules),
         constants,
         coefficients,
     )

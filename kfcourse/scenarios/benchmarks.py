@@ -55,7 +55,7 @@ LORENZ_EVERY = 25  # steps between measurements
 
 def _model(name: str, **changes: Any) -> Model:
     table = MODELS[name] | changes
-    return sampled(**table) if "drift" in table else Model.of_table(table)
+    return (sampled if "drift" in table else Model.define)(**table)
 
 
 def _wander(dt: float) -> Array:

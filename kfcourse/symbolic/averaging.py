@@ -38,7 +38,7 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     ValueError
         Not a structure for each mode.
     """
-    _check(model)
+    check_averaged(model)
     expect_each(structures, "averaged")
     if len(structures) != len(model.modes):
         raise ValueError(
@@ -76,7 +76,7 @@ def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:
 def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
     """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j;
     errors as of `averaged`."""
-    _check(model)
+    check_averaged(model)
     states, meters = zip(*map(compile_noiseless, model.modes), strict=True)
 
     def state(x: Array, k: int | None = None) -> Array:
@@ -91,13 +91,15 @@ def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
     return state, meter
 
 
-def _check(model: JumpModel) -> None:
-    expect(model, JumpModel, "the average over the modes")
-    model.without_state("the average over the modes")
+def check_averaged(model: JumpModel, what: str = "the average over the modes") -> None:
+    """TypeError or ModelError, with what is asked for, where modes have no law before anything is
+    measured, or components no average."""
+    expect(model, JumpModel, what)
+    model.without_state(what)
     if model.angles.x or model.angles.y:
         raise ModelError(
-            "components that are angles have no average over modes; take filters that know the "
-            "modes"
+            f"{what} takes no components that are angles: angles have no average over modes; take "
+            "filters that know the modes"
         )
 
 

@@ -81,7 +81,8 @@ def loop(
     outputs : dict
         Name of an array to the matrix of expressions that is written into it.
     definitions : dict, optional
-        Auxiliary symbols that the outputs and later definitions may use.
+        Auxiliary symbols that the outputs and later definitions may use; what nothing uses is not
+        printed.
     constants : collection of Symbol
         Parameters of the model: numbers `v.<name>`, the same for all trajectories.
     coefficients : dict, optional

@@ -23,7 +23,7 @@ from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.known import Stepwise
-from kfcourse.symbolic.model import OF_A_VARIANT, Model
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -121,7 +121,8 @@ class JumpModel:
         matrix, of_step = _compiled(np.broadcast_to(rows, (size, size)), fitting[0], changed)
         if len(rows) == 1 and first is None and not matrix.has(*fitting[0].x):
             first = of_step.at(0)(np.zeros(fitting[0].n))[0][0].tolist()
-        model = cls(tuple(tables), fitting, _law(first, size), matrix, of_step)
+        law = probabilities("`first`", first, (size,))
+        model = cls(tuple(tables), fitting, law, matrix, of_step)
         if not model.by_state:
             # a row that is none is refused here; of later steps and of states, where they are
             # reached
@@ -154,11 +155,6 @@ class JumpModel:
         return self.modes[0].angles
 
     @property
-    def measured(self) -> list[str]:
-        """Names of the measurement's components."""
-        return self.modes[0].measured
-
-    @property
     def steps(self) -> float:
         """For how many steps the modes' inputs have values."""
         return min(self.chain_of_step.known.steps, *(mode.known.steps for mode in self.modes))
@@ -184,7 +180,7 @@ class JumpModel:
         with np.errstate(all="ignore"):
             rows = self.chain_of_step.at(k)(x)[0]
         finite = rows[np.isfinite(x).all(axis=-1)] if self.by_state else rows
-        _probabilities(f"`transition` at step {k}", finite)
+        probabilities(f"`transition` at step {k}", finite, finite.shape)
         rows = rows / rows.sum(axis=-1, keepdims=True)
         return np.broadcast_to(rows, (*x.shape[:-1], *self.chain.shape))
 
@@ -208,27 +204,12 @@ class JumpModel:
         return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in pairs)})"
 
 
-def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
-    """The model of a table such as [variants.53], or of one with `modes`."""
-    if "modes" not in given:
-        if spare := sorted({"transition", "first"} & set(given)):
-            raise ModelError(f"`{spare[0]}` is of a model with `modes`, and there are none")
-        return Model.of_table(given)
-    if missing := {"state", "meter", "transition"} - set(given):
-        raise ModelError(
-            f"a model with `modes` has no {' and no '.join(sorted(missing))}: give what holds in "
-            "all modes, and `transition`, a matrix of probabilities whose rows sum to 1"
-        )
-    return JumpModel.define(**{key: given[key] for key in given if key not in OF_A_VARIANT})
-
-
 def _tables(modes: Any) -> dict[str, dict[str, Any]]:
-    if not isinstance(modes, Mapping) or not modes:
-        raise ModelError(
-            f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = "
-            f"{{...}}}}, got {shown(modes)}"
-        )
-    tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}
+    tables = {
+        str(name): table(f"modes.{name}", change) for name, change in table("modes", modes).items()
+    }
+    if not tables:
+        raise ModelError("`modes` has no mode; give them by name: {sound = {}, faulty = {...}}")
     for name, change in tables.items():
         if unknown := sorted(set(change) - set(OF_A_MODE)):
             raise ModelError(
@@ -277,21 +258,18 @@ def _compiled(rows: Array, model: Model, changed: set[str]) -> tuple[sp.Immutabl
     return matrix, model.compiled([model.x], [matrix])
 
 
-def _law(first: Any, size: int) -> Array:
-    law = numbers(first)
-    if law.shape != (size,):
+def probabilities(what: str, given: Any, shape: tuple[int, ...]) -> Array:
+    """Probabilities (..., J) whose rows sum to 1; ModelError if they are none, or of another
+    shape."""
+    rows = numbers(given)
+    if rows.shape != shape:
         raise ModelError(
-            f"`first` must be {size} probabilities for {size} mode(s), those of the modes at the "
-            f"first measurement; got {shown(first)}"
+            f"{what} must be probabilities of the shape {shape}, for {shape[-1]} mode(s); got "
+            f"{shown(given)}"
         )
-    _probabilities("`first`", law)
-    return law / law.sum()
-
-
-def _probabilities(what: str, rows: Array) -> None:
-    """ModelError for rows (..., J) that are no probabilities."""
     wrong = ~((rows >= 0).all(axis=-1) & (np.abs(rows.sum(axis=-1) - 1) <= SUM))
     if wrong.any():
         raise ModelError(
             f"{what}: {rows[wrong][0].tolist()} are no probabilities, at least 0 and together 1"
         )
+    return rows / rows.sum(axis=-1, keepdims=True)

@@ -32,17 +32,16 @@ from kfcourse.symbolic.reading import (
     ModelError,
     Names,
     by_name,
-    exact_number,
     formula_list,
     law,
+    numbered,
+    parameter_values,
     read,
     shown,
     table,
 )
 from kfcourse.symbolic.typesetting import aligned, with_index
 from kfcourse.symbolic.writing import formula_latex, number_latex
-
-OF_A_VARIANT = ("title", "steps")  # keys of a variant's table that are not of its model
 
 
 @dataclass(frozen=True)
@@ -145,11 +144,7 @@ class Model:
         >>> Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
-        given = table("parameters", parameters)
-        values = {
-            check_name(name): exact_number(f"parameter {name}", value)
-            for name, value in given.items()
-        }
+        values = parameter_values(parameters)
         a, b, known = (
             formula_list("state", state),
             formula_list("meter", meter),
@@ -183,7 +178,7 @@ class Model:
             law("prior", prior, len(x)),
             law_v,
             law_w,
-            read_angles(angles, [s.name for s in x], _measured(len(b))),
+            read_angles(angles, [s.name for s in x], numbered("y", len(b))),
             known.used(sp.Matrix([*state_equation, *meter_equation]), of_step),
         )
         state_by_name = dict(zip((s.name for s in x), model.state_equation, strict=True))
@@ -204,7 +199,7 @@ class Model:
             for formula in equation:
                 place = f"the {what} equation, {formula!s:.100}, with these parameters"
                 try:
-                    check_numbers(place, sp.Matrix([formula.subs(self.values)]))
+                    check_numbers(place, formula.subs(self.values))
                 except TypeError:  # SymPy's
                     raise ModelError(f"{place}: it compares what has no real value") from None
 
@@ -222,6 +217,11 @@ class Model:
     def values(self) -> dict[sp.Symbol, sp.Rational]:
         """Parameter symbols and their values, for `subs`."""
         return {symbol(name): value for name, value in self.parameters.items()}
+
+    @property
+    def taken(self) -> set[str]:
+        """The names of its symbols."""
+        return {*self.parameters, *by_name(self.x, self.v, self.w, self.known.symbols)}
 
     def difference_equation(self, what: str) -> sp.ImmutableMatrix:
         """a(x, v); ModelError if the model moves in continuous time, of which `what` knows
@@ -242,7 +242,7 @@ class Model:
     @property
     def measured(self) -> list[str]:
         """Names of the measurement's components: y, or y1, y2, ..."""
-        return _measured(self.p)
+        return numbered("y", self.p)
 
     def compiled(self, arguments: Sequence[Entries], outputs: Sequence[Entries]) -> Stepwise:
         """A function of arrays for each step, as of `compile_function`, with the parameters'
@@ -260,20 +260,10 @@ class Model:
                 f"the model has no parameter {', '.join(unknown)}; it has "
                 f"{', '.join(self.parameters) or 'none'}"
             )
-        values = dict(self.parameters) | {
-            name: exact_number(f"parameter {name}", value) for name, value in parameters.items()
-        }
-        changed = dataclasses.replace(self, parameters=values)
+        values = parameter_values(parameters)
+        changed = dataclasses.replace(self, parameters={**self.parameters, **values})
         changed._check()
         return changed
-
-    @classmethod
-    def of_table(cls, table: Mapping[str, Any]) -> Model:
-        """The model of a table such as [variants.53]: its keys are the arguments of `define`, but
-        for title and steps."""
-        if not isinstance(table, Mapping) or not {"state", "meter"} <= set(table):
-            raise ModelError(f"expected a table with state and meter, got {shown(table)}")
-        return cls.define(**{key: table[key] for key in table if key not in OF_A_VARIANT})
 
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
         """The same model with other values of its inputs, or of the time t: those of a record.
@@ -299,10 +289,6 @@ class Model:
 
         Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
         """
-        return aligned(self.lines(values, indexed))
-
-    def lines(self, values: bool = True, indexed: bool = False) -> list[str]:
-        """The lines of `latex`."""
         x, v, w = (
             [sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in group]
             for group in (self.x, self.v, self.w)
@@ -331,7 +317,7 @@ class Model:
                 rf"{sp.latex(name)} &= {number_latex(float(value))}"
                 for name, value in self.values.items()
             ] + self.known.latex("t" if self.between is None else "t_{k}")
-        return lines
+        return aligned(lines)
 
     def __repr__(self) -> str:
         rate = "{}'" if self.between is None else "d{}/dt"
@@ -379,10 +365,6 @@ def nothing_random(model: Model) -> str:
             "estimate; add a noise to one of them"
         )
     return ""
-
-
-def _measured(p: int) -> list[str]:
-    return ["y"] if p == 1 else [f"y{i + 1}" for i in range(p)]
 
 
 def _symbols(

@@ -6,7 +6,7 @@ says what to change.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from numbers import Real
 from typing import Any, TypeAlias
 
@@ -15,7 +15,7 @@ import sympy as sp
 
 from kfcourse.errors import ModelError
 from kfcourse.laws import Array, Gaussian, is_covariance
-from kfcourse.symbolic.formula import parse
+from kfcourse.symbolic.formula import check_name, parse, symbol
 
 Formula: TypeAlias = str | sp.Expr
 Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
@@ -25,6 +25,39 @@ Names: TypeAlias = Sequence[str]
 def by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:
     """Symbols by their names."""
     return {s.name: s for group in groups for s in group}
+
+
+def numbered(name: str, size: int) -> list[str]:
+    """The name itself if it is of one, else with 1, 2, ... behind it."""
+    return [name] if size == 1 else [f"{name}{i + 1}" for i in range(size)]
+
+
+def fresh(name: str, taken: Collection[str]) -> sp.Symbol:
+    """A symbol of that name, with underscores if it is taken."""
+    while name in taken:
+        name += "_"
+    return symbol(name)
+
+
+def normal_symbols(
+    n: int, mean: str, cov: str, taken: Collection[str]
+) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
+    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12,
+    ..., with underscores if they are taken."""
+
+    def of_pair(i: int, j: int) -> sp.Symbol:
+        return fresh(cov if n == 1 else f"{cov}{min(i, j) + 1}{max(i, j) + 1}", taken)
+
+    means = [fresh(name, taken) for name in numbered(mean, n)]
+    return sp.ImmutableMatrix(means), sp.ImmutableMatrix(n, n, of_pair)
+
+
+def parameter_values(given: Mapping[str, Any] | None) -> dict[str, sp.Rational]:
+    """Parameters by name, exactly."""
+    return {
+        check_name(name): exact_number(f"parameter {name}", value)
+        for name, value in table("parameters", given).items()
+    }
 
 
 def shown(value: Any) -> str:

@@ -11,10 +11,9 @@ import sympy as sp
 
 from kfcourse.laws import Gaussian
 from kfcourse.symbolic.choices import by_indicators, jumps
-from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-from kfcourse.symbolic.reading import by_name, exact_matrix
+from kfcourse.symbolic.reading import exact_matrix, normal_symbols
 
 
 @dataclass(frozen=True)
@@ -34,13 +33,14 @@ class Side:
 
     @classmethod
     def of(cls, model: Model, side: str) -> Side:
-        equation, noise, law, names = (
-            (model.state_equation, model.v, model.state_noise, "zp")
+        equation, noise, law, (mean, cov) = (
+            (model.state_equation, model.v, model.state_noise, ("z", "p"))
             if side == "object"
-            else (model.meter_equation, model.w, model.meter_noise, "md")
+            else (model.meter_equation, model.w, model.meter_noise, ("m", "d"))
         )
         exact = Gaussian(*map(exact_matrix, law))
-        return cls(equation, model.x, noise, exact, *gaussian_symbols(model, *names))
+        symbols = normal_symbols(model.n, mean, cov, model.taken)
+        return cls(equation, model.x, noise, exact, *symbols)
 
     def _at_mean(self, matrix: sp.MatrixBase) -> sp.ImmutableMatrix:
         pairs = zip((*self.x, *self.noise), (*self.mean, *self.law.mean), strict=True)
@@ -100,30 +100,6 @@ def moments(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
     cov = sp.ImmutableMatrix(size, size, lambda i, j: upper[min(i, j), max(i, j)])
     slope = mean.jacobian(side.mean)
     return mean, slope, cov, cov - slope * side.cov * slope.T
-
-
-def gaussian_symbols(
-    model: Model, mean: str, cov: str
-) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
-    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12,
-    ...
-
-    A name that the model already uses gets a trailing underscore.
-    """
-    taken = {*model.parameters, *by_name(model.x, model.v, model.w, model.known.symbols)}
-
-    def fresh(name: str) -> sp.Symbol:
-        while name in taken:
-            name += "_"
-        return symbol(name)
-
-    n = model.n
-    if n == 1:
-        return sp.ImmutableMatrix([fresh(mean)]), sp.ImmutableMatrix([fresh(cov)])
-    means = [fresh(f"{mean}{i + 1}") for i in range(n)]
-    return sp.ImmutableMatrix(means), sp.ImmutableMatrix(
-        n, n, lambda i, j: fresh(f"{cov}{min(i, j) + 1}{max(i, j) + 1}")
-    )
 
 
 def plain(matrix: sp.MatrixBase) -> Any:

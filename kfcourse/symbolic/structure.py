@@ -35,7 +35,7 @@ from kfcourse.laws import (
 )
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.sides import Side, moments, taylor
+from kfcourse.symbolic.sides import Side, moments, plain, taylor
 from kfcourse.symbolic.typesetting import aligned
 from kfcourse.symbolic.writing import formula_lines
 
@@ -100,7 +100,7 @@ class Structure:
             raise NoClosedForm(
                 f"there is no formula of {function!r}; derived are {', '.join(formulas.functions)}"
             ) from None
-        return matrix[0] if matrix.shape == (1, 1) else matrix
+        return plain(matrix)
 
     def latex(self) -> str:
         """The five functions as a LaTeX `aligned` block, parameters as symbols; matrices entry by

@@ -32,9 +32,13 @@ def equation_latex(equation: Equation, names: Mapping[Any, str] | None = None) -
 
     Sides that print alike are printed once.
     """
-    first, *others = (
-        lines for lines, _ in groupby(side_lines(side, WIDTH - 6, names) for side in equation)
-    )
+
+    def side_lines(side: Side) -> list[str]:
+        if isinstance(side, str):
+            return [side]
+        return printed_lines(_printer(side, names), side, WIDTH - 6)
+
+    first, *others = (side for side, _ in groupby(map(side_lines, equation)))
     if len(first) > 1:
         raise ValueError(
             "the left side of an equation is too long for one line: give it a name, and the "
@@ -52,14 +56,12 @@ def equation_latex(equation: Equation, names: Mapping[Any, str] | None = None) -
     return "\\\\\n".join([*lines, line])
 
 
-def side_lines(side: Side, width: int = WIDTH, names: Mapping[Any, str] | None = None) -> list[str]:
-    """LaTeX of one side of an equation, in as many lines as it takes; only sums are broken."""
-    if isinstance(side, str):
-        return [side]
-    whole = latex(side, names)
-    if symbols(whole) <= width or not isinstance(side, sp.Add):
+def printed_lines(printer: Printer, expression: Any, width: float) -> list[str]:
+    """An expression as it is printed, in as many lines as it takes; only sums are broken."""
+    whole = printer.doprint(expression)
+    if symbols(whole) <= width or not isinstance(expression, sp.Add):
         return [whole]
-    return joined([latex(term, names) for term in _ordered(side.as_ordered_terms())], width)
+    return joined([printer.doprint(term) for term in printer.terms(expression)], width)
 
 
 def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
@@ -77,6 +79,10 @@ def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
     """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around
     derivatives; of an `UnevaluatedExpr` with its terms and factors in the order in which they
     stand."""
+    return _printer(expression, names).doprint(expression)
+
+
+def _printer(expression: Any, names: Mapping[Any, str] | None) -> Printer:
     settings = {
         "symbol_names": dict(names or {}),
         "diff_operator": "d",
@@ -84,7 +90,7 @@ def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
         "fold_short_frac": False,
         "order": "none" if isinstance(expression, sp.UnevaluatedExpr) else None,
     }
-    return str(Printer(settings).doprint(expression))
+    return Printer(settings)
 
 
 def aligned(lines: Sequence[str]) -> str:
@@ -108,6 +114,11 @@ class Printer(LatexPrinter):
     def doprint(self, expr: Any) -> str:
         return _NAME_BEFORE_A_FACTOR.sub(r"\1\, ", super().doprint(expr))
 
+    def terms(self, total: sp.Add) -> list[sp.Expr]:
+        """The terms of a sum in the order in which they are printed."""
+        terms = super()._as_ordered_terms(total)
+        return terms if self.order == "none" else _ordered(terms)
+
     def _print_Symbol(self, expr: sp.Symbol, style: str = "plain") -> str:
         printed = _WORD_BELOW.sub(r"_{\\mathrm{\1}", super()._print_Symbol(expr, style))
         several = len(printed) > 1 and printed.isascii() and printed.isalpha()
@@ -118,8 +129,7 @@ class Printer(LatexPrinter):
         )
 
     def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
-        terms = super()._as_ordered_terms(expr, order=order)
-        return terms if self.order == "none" else _ordered(terms)
+        return self.terms(expr)
 
     def _print_Identity(self, expr: sp.Identity) -> str:
         return "I"

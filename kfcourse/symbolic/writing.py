@@ -13,7 +13,7 @@ from itertools import groupby
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
-from kfcourse.symbolic.typesetting import WIDTH, Printer, joined, symbols
+from kfcourse.symbolic.typesetting import WIDTH, Printer, printed_lines, symbols
 
 
 def formula_latex(
@@ -38,13 +38,7 @@ def formula_lines(
 ) -> list[str]:
     """The same in as many lines as a page is wide beside what stands before them; only sums are
     broken."""
-    expression = _readable(expression)
-    whole = formula_latex(expression, variables)
-    width = WIDTH - symbols(before)
-    if symbols(whole) <= width or not isinstance(expression, sp.Add):
-        return [whole]
-    writer = _Writer(variables)
-    return joined([writer.doprint(term) for term in writer.terms(expression)], width)
+    return printed_lines(_Writer(variables), _readable(expression), WIDTH - symbols(before))
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:
@@ -97,9 +91,6 @@ class _Writer(Printer):
         super().__init__({"order": "none", "fold_func_brackets": True})
         self.rank = {symbol: place for place, symbol in enumerate([*variables, *noises])}
         self.noises = set(noises)
-
-    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
-        return self.terms(expr)
 
     def _print_Mul(self, expr: sp.Mul) -> str:
         factors = sorted(sp.Mul.make_args(expr), key=self.factor_key)  # a 1/x comes here, too

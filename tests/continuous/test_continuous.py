@@ -162,43 +162,17 @@ def test_an_explosion_is_reported():
         simulate(model, 0.1, 100, 4, 1)
 
 
-# --- the filter against slow loops
+# --- the filter against a slow loop
 
 
 @pytest.mark.parametrize("second", [False, True])
-def test_the_scalar_filter_is_the_loop_in_plain_floats(second):
-    T, N, S_xi, steps, runs = 0.01, 0.5, 1.6, 60, 3
-    model = ContinuousModel.define("-1.1*x + 0.1*x**2", "0.8 + 0.2*x", "2*sin(x)", **LAWS)
-    y = simulate(model, T, steps, runs, 2).y
-    y[7, 1] = y[20:23, 2] = np.nan
-    ours = predictions(extended_kalman_bucy(model, T, second), y)
-    for r in range(runs):
-        z, D = 0.4, 0.3
-        for k in range(steps):
-            # rounding of 60 steps
-            assert math.isclose(ours.mean[k, r, 0], z, rel_tol=1e-11, abs_tol=1e-12)
-            assert math.isclose(ours.cov[k, r, 0, 0], D, rel_tol=1e-11)
-            S, S1 = 2 * math.sin(z), 2 * math.cos(z)
-            S2 = -S  # its second derivative
-            seen = not np.isnan(y[k, r, 0])
-            innovation = y[k, r, 0] - S if seen else 0.0
-            B = 1 / (1 / D + T * S1**2 * 2 / N) if seen else D
-            M = 1.0
-            if second and seen:
-                W, V = S2 * 2 / N * innovation, S2**2 * 2 / N * B
-                M = (1 + T * B * W / 2) / (1 + T * B * V / 8)
-            A, Q = -1.1 + 0.2 * z, (0.8 + 0.2 * z) ** 2 * S_xi / 2
-            z = z + T * (-1.1 * z + 0.1 * z**2 + B * S1 * 2 / N * innovation)
-            D = (M + T * A) ** 2 * B + T * Q
-
-
-def test_the_vector_filter_is_the_page():
+def test_the_filter_is_the_page(second):
     """The equations of the docstring with explicit inverses and loops, derivatives by hand."""
     T, steps, runs = 0.01, 40, 3
     model = nonlinear_vector()
     y = simulate(model, T, steps, runs, 6).y
     y[3, 0, 1] = y[5:9, 1, 0] = y[9, 2] = np.nan
-    ours = predictions(extended_kalman_bucy(model, T, second_derivatives=True), y)
+    ours = predictions(extended_kalman_bucy(model, T, second), y)
     N, identity = np.array(N_VECTOR), np.eye(2)
     for r in range(runs):
         z, D = np.array([0.6, -0.5]), np.array([[0.3, 0.05], [0.05, 0.2]])
@@ -219,8 +193,8 @@ def test_the_vector_filter_is_the_page():
             C = 2 * np.linalg.inv(N[np.ix_(seen, seen)])
             B = np.linalg.inv(np.linalg.inv(D) + T * H.T @ C @ H)
             # with a component missing, the second derivatives are left out
-            W = seen.all() * np.einsum("i,iab", C @ innovation, hessians)
-            V = seen.all() * np.einsum("ij,iab,bc,jcd", C, hessians, B, hessians)
+            W = second * seen.all() * np.einsum("i,iab", C @ innovation, hessians)
+            V = second * seen.all() * np.einsum("ij,iab,bc,jcd", C, hessians, B, hessians)
             M = np.linalg.inv(identity + T / 8 * B @ V) @ (identity + T / 2 * B @ W)
             z = z + T * (f + B @ H.T @ C @ innovation)
             D = (M + T * A) @ B @ (M + T * A).T + T * g @ np.array(S_VECTOR) @ g.T / 2
@@ -254,9 +228,6 @@ def test_the_white_term_has_the_mean_that_ito_s_sense_demands():
         assert np.abs((weight @ posterior.mean - model.prior.mean) / T).max() < 0.01
     assert left[0] < 0.02 * np.abs(rate).max()
     assert 1.7 < left[0] / left[1] < 2.3
-
-
-# --- linear models
 
 
 # --- functions of time
@@ -373,11 +344,9 @@ def test_a_lost_filter_is_named():
     ("arguments", "settings", "message"),
     [
         (("-x", "1", "x"), {"noise_density": 0}, "positive definite"),
-        (("-x", "1", "x"), {"spectral_density": -0.1}, "negative variance"),
         (("-x", "1", "x"), {"spectral_density": [1, 2]}, "spectral_density"),
         (("-x", "1", "x", {"x": 2}), {}, "named twice"),
         ((["x2", "-x1"], "1", "x1"), {}, r"1 row\(s\) of diffusion"),
-        ((["x2", "-x1"], [["0"], ["1", "2"]], "x1"), {}, "different lengths"),
         (("-x", "1", "2"), {}, "does not depend on the state"),
         (("-x/(a - b)", "1", "x", {"a": 1, "b": 1}), {}, "no finite real value"),
     ],
@@ -387,7 +356,7 @@ def test_bad_models(arguments, settings, message):
         ContinuousModel.define(*arguments, **settings)
 
 
-@pytest.mark.parametrize("step", [0, -0.1, float("nan"), float("inf"), "0.1", True, None])
+@pytest.mark.parametrize("step", [0, -0.1, float("nan"), float("inf")])
 def test_bad_steps(step):
     model = parabola()
     for use in (
@@ -395,14 +364,8 @@ def test_bad_steps(step):
         lambda: simulate(model, step, 1, 1, 0),
         lambda: extended_kalman_bucy(model, step),
     ):
-        with pytest.raises(ValueError, match="positive number of time units"):
+        with pytest.raises(ValueError, match="step must be positive and finite"):
             use()
-
-
-@pytest.mark.parametrize("bad", [{"steps": 0}, {"runs": 1.5}, {"substeps": -1}, {"runs": True}])
-def test_bad_sizes(bad):
-    with pytest.raises(ValueError, match=f"{next(iter(bad))} must be a positive whole number"):
-        simulate(parabola(), 0.1, **({"steps": 2, "runs": 2, "seed": 0} | bad))
 
 
 RATES = (0.1, 0.5, 0.7, 1.3, 3.0, 7.0)

@@ -10,6 +10,7 @@ from test_every_filter import READY
 from kfcourse import (
     Ensemble,
     Model,
+    compare,
     design,
     gaussian,
     likelihood,
@@ -170,6 +171,14 @@ def test_what_a_gate_cannot_stand_before_is_refused():
         problem = rf"looking back needs the structural functions.*gated-{filter_.name} has none"
         with pytest.raises(ValueError, match=problem):
             smooth(gated(filter_, structure=linearised(walk())), np.zeros(3))
+    # and their scores are those of the likelihood alone
+    filters = [
+        gated(each, structure=linearised(walk())) for each in (READY["imm"](walk()), filter_)
+    ]
+    compared = compare(
+        [*filters, kalman_filter(walk())], walk(), 64, 2, 1, scores=linearised(walk())
+    )
+    assert len(compared.names) == 3
     with pytest.raises(ValueError, match=r"kalman takes every measurement as it is: ask gated"):
         weights(kalman_filter(walk()), np.zeros(3))
 

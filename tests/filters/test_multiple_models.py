@@ -91,12 +91,11 @@ TWO = [[0.9, 0.1], [0.1, 0.9]]
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"transition": TWO}, r"transition must have the shape \(3, 3\)"),
-        ({"transition": PI.T}, "sum to 1 in each row"),
-        ({"transition": 2 * np.eye(3) - np.ones((3, 3)) / 3}, "must be probabilities"),
-        ({"probabilities": [0.5, 0.5]}, r"probabilities must have the shape \(3,\)"),
-        ({"probabilities": [0.5, 0.6, -0.1]}, "probabilities must be probabilities"),
-        ({"probabilities": [np.nan, 0.5, 0.5]}, "probabilities must be probabilities"),
+        ({"transition": TWO}, r"transition must be probabilities of the shape \(3, 3\)"),
+        ({"transition": PI.T}, "are no probabilities"),
+        ({"transition": 2 * np.eye(3) - np.ones((3, 3)) / 3}, "are no probabilities"),
+        ({"probabilities": [0.5, 0.5]}, r"probabilities must be probabilities of the shape \(3,\)"),
+        ({"probabilities": [0.5, 0.6, -0.1]}, "probabilities: .* are no probabilities"),
         *(
             ({"structures": [linearised(MODELS[0]), linearised(other)], "transition": TWO}, message)
             for other, message in (
@@ -142,7 +141,5 @@ def test_probabilities_that_are_none_at_a_later_step_are_refused():
     model = Model.define("x + v", "x + w")
     filter_ = imm([linearised(model)] * 2, lambda k: [[0.9, 0.1], [0.1, 0.9 + 0.1 * (k == 2)]])
     run(filter_, np.zeros(2))
-    with pytest.raises(
-        ValueError, match="transition must be probabilities that sum to 1 in each row"
-    ):
+    with pytest.raises(ValueError, match=r"transition: .* are no probabilities"):
         run(filter_, np.zeros(3))

@@ -2,6 +2,7 @@
 refused."""
 
 import numpy as np
+import oracles
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from test_jumps import SENSOR, failing, of
@@ -9,7 +10,6 @@ from test_jumps import SENSOR, failing, of
 from kfcourse import Gaussian, JumpModel, ModelError, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
-from kfcourse.montecarlo.experiment import states
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
 pytestmark = pytest.mark.quick
@@ -76,8 +76,8 @@ def test_the_prediction_has_the_weighted_moments():
 
 
 def test_components_that_the_chain_does_not_contain_follow_by_regression():
-    """Against the moments of drawn states, weighted by pi(x2), for a law whose components are
-    correlated."""
+    """Against the moments of the state, weighted by pi(x2), on a product rule of all components,
+    which are correlated."""
     model = JumpModel.define(
         ["x1 + x2 + v1", "x2 + v2", "x3 + v3"],
         ["x1 + C*w1"],
@@ -89,48 +89,17 @@ def test_components_that_the_chain_does_not_contain_follow_by_regression():
         ],
         first=[0.5, 0.5],
     )
-    rng, size = np.random.default_rng(1), 400_000
-    mean, root = (
-        np.array([[0.3, -0.8, 1.0]]),
-        np.array([[1.0, 0.0, 0.0], [0.6, 0.9, 0.0], [-0.4, 0.5, 0.3]]),
-    )
-    nu, laws = by_state(model)(0, [Gaussian(mean, (root @ root.T)[None])] * 2)
-    x = mean + rng.normal(size=(size, 3)) @ root.T
+    mean, root = np.array([0.3, -0.8, 1.0]), np.array([[1, 0, 0], [0.6, 0.9, 0], [-0.4, 0.5, 0.3]])
+    cov = root @ root.T
+    nu, laws = by_state(model)(0, [Gaussian(mean[None], cov[None])] * 2)
+    x, weights = oracles.gaussian_points(mean, cov, 24)
     for i, first in enumerate((1 / (1 + np.exp(x[:, 1])), 0.5 + 0.4 * np.sin(x[:, 1]))):
         for j, p in enumerate((first, 1 - first)):
-            assert abs(p.mean() - nu[0, i, j]) < 4 * p.std() / np.sqrt(size)
-            law = laws[i][j]
-            away = x - law.mean
-            pairs = [away[:, a] for a in range(3)]
-            pairs += [
-                away[:, a] * away[:, b] - law.cov[0, a, b] for a in range(3) for b in range(a, 3)
-            ]
-            for part in pairs:  # M[part pi] = 0
-                assert abs((part * p).mean()) < 4 * (part * p).std() / np.sqrt(size)
-
-
-def test_the_exact_filter_is_a_plain_grid_of_both():
-    model, x = overloaded(), np.linspace(-14, 14, 3001)
-    y = simulate(model, 3, 8, seed=5).y
-    visited, step = states(pointmass(model), y), x[1] - x[0]
-    prior = np.exp(-((x - 0.5) ** 2) / 6)
-    grids = [np.stack([0.9 * prior, 0.1 * prior]) for _ in range(3)]
-    kernel = np.exp(-0.5 * ((x[:, None] - 0.9 * x) / 0.7) ** 2) * step
-    to_faulty = probabilities(x).T
-    for k, state in enumerate(visited[1:]):
-        for trajectory, value in enumerate(y[k, :, 0]):
-            density = grids[trajectory]
-            for j, C in enumerate((1.0, 10.0)):
-                density[j] *= np.exp(-0.5 * ((value - x) / C) ** 2) / C
-            density /= density.sum()
-            z = density.sum(axis=0) @ x
-            variance = density.sum(axis=0) @ (x - z) ** 2
-            assert abs(state.posterior.mean[trajectory, 0] - z) < 2e-3 * np.sqrt(variance), k
-            assert abs(state.posterior.cov[trajectory, 0, 0] / variance - 1) < 4e-3, k
-            assert_allclose(state.memory.probability[trajectory], density.sum(axis=1), atol=2e-3)
-            faulty = (to_faulty * density).sum(axis=0)
-            grids[trajectory] = np.stack([kernel @ (density.sum(axis=0) - faulty), kernel @ faulty])
-    assert (state.memory.discretisation_error() < 1e-2).all()
+            share = weights * p / (weights @ p)
+            away = x - share @ x
+            assert nu[0, i, j] == pytest.approx(weights @ p, rel=1e-7)
+            assert_allclose(laws[i][j].mean[0], share @ x, rtol=1e-6)
+            assert_allclose(laws[i][j].cov[0], (share * away.T) @ away, rtol=1e-6, atol=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from kfcourse import Model, ModelError, linearised
 from kfcourse.symbolic.codegen import _shared, compile_function
@@ -17,20 +17,14 @@ x1, x2, p11, p12, p22 = sp.symbols("x1 x2 p11 p12 p22", real=True)
 ARGUMENTS = [[x1, x2], sp.Matrix([[p11, p12], [p12, p22]])]
 
 EXPRESSIONS = [
-    x1**2 - 3 * x2**7 / 5,
-    (x1 + x2) ** 4 * x1**-3,
+    (x1 + x2) ** 4 * x1**-3 - 3 * x2**7 / 5,
     sp.sqrt(p11) * sp.exp(-x1 * p12) + sp.sin(x2) ** 3,
     sp.Abs(x1 - x2) ** sp.Rational(3, 2) - x1 / (3 * x2),
     sp.tanh(x1) + sp.atan(x2) + sp.log(p22) + sp.cosh(x1) * sp.sinh(x2) * sp.tan(x1 / 4),
-    x1 - (x2 - (p11 - p22)) * -2,
-    -x1,
-    2 / x1,
-    1 / (x1 * x2**2),
+    2 / (x1 * x2**2) - x1,
     x1 / p11 ** sp.Rational(3, 2) - x2 / sp.pi**2,
     x1 * sp.exp(sp.Rational(1, 200)) * sp.sqrt(2) * sp.sin(1),  # constants that are not rational
-    sp.exp(sp.Rational(1, 200)) * sp.sin(1) + x2 * sp.pi * sp.sqrt(3),
     sp.sqrt(2 + sp.sqrt(3)) * x1 + sp.Rational(1, 3) * sp.pi,
-    2 ** sp.Rational(1, 4) * x1,
     sp.cot(x1) + sp.sec(x2),
     sp.Max(x1, x2, 1, x1 * x2) - sp.Min(x1, x2, 1, x1 * x2),
     sp.sign(x1) * x2 + sp.Piecewise((x1, x2 > 0), (p11, True)),
@@ -82,15 +76,6 @@ def test_what_models_share_is_compiled_once():
     assert first.compiled_predict.function is not second.compiled_predict.function
 
 
-def test_leading_axes_broadcast(ensemble):
-    x, p = ensemble
-    code = compile_function(ARGUMENTS, [[x1 * p11, x2 - p12]])
-    expected = code(x, np.broadcast_to(p[0], p.shape))[0]
-    assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
-    assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
-    assert_array_equal(code(x[3], p[0])[0], expected[3])  # no leading axes at all
-
-
 def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
     """A vector is one for each trajectory; what a matrix is made of may come by way of what is
     found once for several entries."""
@@ -106,6 +91,7 @@ def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
     ]
     code = compile_function(ARGUMENTS, outputs)
     rest = [(1, 1), (50, 1), (50, 1)]
+    assert [part.shape for part in code(x[0], p[0])] == [(2,), (2, 2), (1, 2), (1, 1), (1,), (1,)]
     assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2), *rest]
     assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2), *rest]
     assert_allclose(code(x, p)[3], np.sqrt(2), rtol=1e-15)

@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import JumpModel, Model, ModelError, simulate
 from kfcourse.symbolic.averaging import averaged_equations
-from kfcourse.symbolic.jumping import model_of_table
 
 pytestmark = pytest.mark.quick
 
@@ -138,10 +137,9 @@ def test_averaged_equations():
             "^`transition`: an entry = True: expected a finite number",
         ),
         ({"first": [0.8, 0.3]}, r"`first`: \[0.8, 0.3\] are no probabilities"),
-        ({"first": [1.0]}, "`first` must be 2 probabilities"),
-        ({"first": "often"}, "`first` must be 2 probabilities"),
-        ({"first": None}, r"`first` must be 2 probabilities.*; got None"),
-        ({"modes": {}}, "`modes` must be a table of modes by name"),
+        ({"first": [1.0]}, r"`first` must be probabilities of the shape \(2,\)"),
+        ({"first": None}, r"`first` must be probabilities of the shape .* mode\(s\); got None"),
+        ({"modes": {}}, "`modes` has no mode"),
         (
             with_odd({"prior": {"mean": 1}}),
             "mode odd: modes may differ in state, meter, .* not in prior",
@@ -172,20 +170,3 @@ def test_a_chain_that_fails_late_says_so_when_it_comes_there():
     assert model.transition_at(90).shape == (2, 2)
     with pytest.raises(ModelError, match=r"at step 91: \[-0.01.*\] are no probabilities"):
         model.transition_at(91)
-
-
-def test_tables():
-    plain = {"state": "0.9*x + v", "meter": "x + w"}
-    assert isinstance(model_of_table(plain), Model)
-    assert isinstance(
-        model_of_table(plain | {"title": "t", "modes": {"a": {}}, "transition": [1]}), JumpModel
-    )
-    for change, message in (
-        ({"first": [1]}, "`first` is of a model with `modes`"),
-        ({"modes": {"a": {}}}, r"has no transition: .*a matrix of probabilities"),
-        ({"modes": {"a": {}}, "transition": [1], "meter": None}, "must be a formula"),
-    ):
-        with pytest.raises(ModelError, match=message):
-            model_of_table(plain | change)
-    with pytest.raises(ModelError, match="no meter"):
-        model_of_table({"state": "x + v", "modes": {"a": {}}, "transition": [1]})

@@ -92,9 +92,7 @@ REFUSED = [
       for value in (np.nan, "0.9", True, 1e300, 1e-300)),
     ("c*x + v", "x + w", {"parameters": {"c": HUGE}}, "parameter c = 1000"),
     (*PLAIN, {"parameters": {"x": 1}}, "x named twice"),
-    (*PLAIN, {"parameters": {"lambda": 1}}, "reserved word"),
     (*PLAIN, {"parameters": {"sin": 1}}, "already means"),
-    (*PLAIN, {"parameters": {"__class__": 1}}, "cannot name"),
     (*PLAIN, {"parameters": [1]}, "must be a table"),
     (*PLAIN, {"symbols": {"u": ["u"]}}, "keys x, v, w"),
     (*PLAIN, {"symbols": {"x": ["x", "q"]}}, "1 state equation"),
@@ -106,14 +104,11 @@ REFUSED = [
     (*PLAIN, {"prior": {"variance": [[1, 0], [0, 1]]}}, "shape"),
     (*PLAIN, {"prior": {"mean": "1"}}, "must be finite numbers"),
     (*PLAIN, {"prior": {"mean": np.nan}}, "finite"),
-    (*PLAIN, {"meter_noise": {"variance": [[[1]]]}}, "must be finite numbers"),
     (*TWO, {"prior": {"variance": [[1, 0.2], [0.3, 1]]}}, "symmetric"),
     (*TWO, {"prior": {"variance": [[1, 2], [2, 1]]}}, "negative"),
     ("x + w", "x + w", {}, "unknown symbol 'w'"),  # the meter's noise in the object
-    ("x + v", "x + v", {}, "unknown symbol 'v'"),
     (sp.Symbol("x") + sp.Symbol("q"), "x + w", {}, "unknown symbols q"),
     ("x + v", "w", {}, "nothing to filter"),
-    ("x + v", "0*x + w", {}, "nothing to filter"),
     ("x + v", [], {}, "no formula"),
     *((state, "x + w", {}, "must be a formula") for state in ([3], None)),
     # numbers out of all sizes, with their place
@@ -148,14 +143,12 @@ def test_a_vector_model_prints_every_component():
     assert (
         repr(model) == "Model(x1' = a*x1 + x2, x2' = v + x2, y1 = w1 + x1, y2 = w2 + 2*x2; a = 1/2)"
     )
-    equations = [
-        r"x_{1,k+1} &= a x_{1} + x_{2} \\",
-        r"x_{2,k+1} &= x_{2} + v \\",
-        r"y_{1,k} &= x_{1} + w_{1} \\",
-        r"y_{2,k} &= 2 x_{2} + w_{2}",
+    # the lines without and with values; more in tests/golden
+    assert model.latex().splitlines()[1:-1] == [
+        *model.latex(values=False).splitlines()[1:-2],
+        r"y_{2,k} &= 2 x_{2} + w_{2} \\",
+        "a &= 0.5",
     ]
-    assert model.latex(values=False).splitlines()[1:-1] == equations
-    assert model.latex().splitlines()[1:-1] == [*equations[:3], equations[3] + r" \\", "a &= 0.5"]
 
 
 def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
@@ -203,9 +196,3 @@ def test_where_nobody_finds_the_place_of_a_jump_there_may_be_one(condition):
 def test_something_must_be_random(state, meter, laws, problem):
     problems = nothing_random(Model.define(state, meter, {"e": 0} if "e*" in state else {}, **laws))
     assert problem in problems and bool(problem) == bool(problems)
-
-
-@pytest.mark.parametrize("given", [5, {}, {"state": "x + v"}])
-def test_a_table_that_is_no_model_is_refused(given):
-    with pytest.raises(ModelError, match="expected a table with state and meter"):
-        Model.of_table(given)
