@@ -210,10 +210,10 @@ ROOMS = {
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
-    "kfcourse/records": 6_250,
+    "kfcourse/records": 6_030,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_900,
+    "tests": 187_860,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -232,7 +232,7 @@ def test_every_filter_of_the_option(place, structure):
         (
             "missing.csv --model my.toml --variant line",
             1,
-            ["no file of measurements at missing.csv"],
+            ["missing.csv cannot be read: No such file"],
         ),
         ("line.csv --model my.toml", 1, ["3 models; say which", "--variant plane"]),
         ("line.csv --model my.toml --variant plane", 1, ["no column 'y1'"]),

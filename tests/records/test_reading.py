@@ -156,7 +156,7 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
         (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
         (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2, column y1: .* got 'm'; if this is a line of "
 "units, delete it"),
-        (GOOD.replace(",", " "), "one column, 'time y1 y2 a': spaces do not separate cells"),
+        (GOOD.replace(",", " "), "it has 'time y1 y2 a'; commas, tabs or semicolons separate"),
         ("# recorded by me\n" + GOOD, "line 2: 4 cells, .*delete what stands above the names"),
         ("# " + GOOD, "no column 'time'; it has '# time', 'y1'"),
         ("time,y1,y2,a\n1484649904.25,1,2,3\n1484649904.2,1,2,3\n", "1484649904.2 comes after "
@@ -170,14 +170,9 @@ def test_a_bad_file_is_refused_with_its_place(read, content, message):
 
 
 def test_what_is_no_file(tmp_path):
-    with pytest.raises(RecordError, match=r"no file of measurements at .*missing"):
-        read_measurements(tmp_path / "missing.csv", WALK)
-    with pytest.raises(RecordError, match="cannot be read: Is a directory"):
-        read_measurements(tmp_path, WALK)
-    with (tmp_path / "large.csv").open("wb") as file:
-        file.truncate(100_000_001)  # sparse
-    with pytest.raises(RecordError, match="more than 100,000,000 bytes"):
-        read_measurements(tmp_path / "large.csv", WALK)
+    for path, why in ((tmp_path / "missing.csv", "No such file"), (tmp_path, "Is a directory")):
+        with pytest.raises(RecordError, match=f"{path} cannot be read: {why}"):
+            read_measurements(path, WALK)
 
 
 def test_inputs_of_a_model_are_replaced_by_name():
