@@ -211,7 +211,7 @@ ROOMS = {
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 6_030,
-    "kfcourse/scenarios": 10_800,
+    "kfcourse/scenarios": 10_500,
     "kfcourse/symbolic": 20_980,
     "tests": 187_860,
 }

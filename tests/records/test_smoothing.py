@@ -22,7 +22,7 @@ from kfcourse import (
 )
 from kfcourse.filters import aof, duof, imm, iterated, kalman_filter, pointmass
 from kfcourse.records import smooth_iterated, smoothing_error
-from kfcourse.scenarios.benchmarks import PENDULUM_SMOOTHED, pendulum, pendulum_data
+from kfcourse.scenarios.benchmarks import PUBLISHED, pendulum, pendulum_data
 from kfcourse.symbolic.equations import compile_noiseless
 
 pytestmark = pytest.mark.quick
@@ -125,7 +125,7 @@ def test_the_pendulum_s_smoothers_have_their_published_errors(name, build):
     mean = smooth(aof(build(pendulum())), y).mean[1:, 0, 0]
     # 500 steps there and back round differently in another order of operations
     assert np.sqrt(np.mean((mean - x[:, 0]) ** 2)) == pytest.approx(
-        PENDULUM_SMOOTHED[name], rel=1e-12
+        PUBLISHED["pendulum_smoothed"][name], rel=1e-12
     )
 
 

@@ -9,9 +9,7 @@ from scipy.integrate import solve_ivp
 from kfcourse import linearised, run, simulate
 from kfcourse.filters import aof, kalman_filter
 from kfcourse.scenarios.benchmarks import (
-    BEARINGS_ERRORS,
-    CAR_ERRORS,
-    REENTRY_ERRORS,
+    PUBLISHED,
     bearings,
     bearings_data,
     car,
@@ -54,7 +52,7 @@ def test_the_extended_filter_has_the_published_errors():
     error = run(aof(linearised(bearings())), y).mean[1:, :, :2] - x
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
     assert (
-        abs(each.mean() - BEARINGS_ERRORS["EKF"])
+        abs(each.mean() - PUBLISHED["bearings_errors"]["EKF"])
         < 4 * each.std() * np.sqrt(1 / 200 + 1 / 1000) + 5e-4
     )
 
@@ -77,7 +75,8 @@ def test_the_reentry_s_extended_filter_has_the_published_error():
     error = (run(aof(linearised(reentry(known=False))), y).mean - x)[1:, :, :2]
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
     assert (
-        abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 20 + 1 / 100) + 5e-5
+        abs(each.mean() - PUBLISHED["reentry_errors"]["EKF"])
+        < 4 * each.std() * np.sqrt(1 / 20 + 1 / 100) + 5e-5
     )
 
 
@@ -94,7 +93,8 @@ def test_the_car_of_the_source():
     # 100 steps of rounding
     assert_allclose(run(kalman_filter(car()), y).mean[:, 0], means, rtol=0, atol=1e-10)
     for name, place in (("measurements", y[1:, 0]), ("Kalman", np.array(means)[1:, :2])):
-        assert abs(np.sqrt(((place - x[:, :2]) ** 2).sum(axis=1).mean()) - CAR_ERRORS[name]) < 1e-12
+        error = np.sqrt(((place - x[:, :2]) ** 2).sum(axis=1).mean())
+        assert abs(error - PUBLISHED["car_errors"][name]) < 1e-12
 
 
 def test_the_conditionally_minimax_models_are_those_of_the_source():

@@ -19,16 +19,16 @@ from kfcourse import (
     unscented,
 )
 from kfcourse.filters import aof
-from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
+from kfcourse.scenarios.benchmarks import PUBLISHED, pendulum, pendulum_data
 from kfcourse.symbolic.quadrature import axes
 
 
 @pytest.mark.parametrize(
     ("structure", "published"),
     [
-        (linearised, PENDULUM_ERRORS["EKF"]),
-        (unscented, PENDULUM_ERRORS["UKF"]),  # alpha = 1, beta = 0, kappa = 3 - n
-        (lambda model: gauss_hermite(model, 5), PENDULUM_ERRORS["Gauss-Hermite 5"]),
+        (linearised, PUBLISHED["pendulum_errors"]["EKF"]),
+        (unscented, PUBLISHED["pendulum_errors"]["UKF"]),  # alpha = 1, beta = 0, kappa = 3 - n
+        (lambda model: gauss_hermite(model, 5), PUBLISHED["pendulum_errors"]["Gauss-Hermite 5"]),
     ],
 )
 def test_the_pendulum_has_its_published_errors(structure, published):
