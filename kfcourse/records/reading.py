@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.errors import expect
+from kfcourse.files import read_text
 from kfcourse.laws import Array
 from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.model import Model
@@ -196,17 +197,7 @@ class _Table(NamedTuple):
 def _table(path: Path) -> _Table:
     """The cells of a file.  Of a single column an empty line is a row, too: a measurement that is
     missing."""
-    try:
-        content = path.read_bytes()
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise RecordError(f"{path} cannot be read: {error.strerror}; check the path") from None
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise RecordError(
-            f"{path}, line {line}: a byte that is not UTF-8 (perhaps UTF-16?); save the file as "
-            "CSV in UTF-8"
-        ) from None
+    text = read_text(path, RecordError)
     delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
     table = _Table(path, [], [], [])
     for number, line in enumerate(text.rstrip().splitlines(), 1):

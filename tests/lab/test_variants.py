@@ -147,7 +147,7 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
             "is not valid TOML",
         ),
         ("[variants]\nbad = 5", "variant bad in"),
-        (b"\xff\xfe", "cannot be read"),
+        (b"\xff\xfe", "line 1: a byte that is not UTF-8"),
     ],
 )
 def test_a_bad_file_is_refused_by_name(tmp_path, content, problem):
@@ -168,7 +168,7 @@ def test_only_the_variants_asked_for_are_built(tmp_path, monkeypatch):
         of_variants, "read_variant", lambda name, *rest: built.append(name) or whole(name, *rest)
     )
     assert find_variant("4711", path).name == "4711" and built == ["4711"]
-    assert [each.name for each in chosen_variants(["7", "3", "7"], False, path)] == [
+    assert [each.name for each in chosen_variants(["7", "3", "7"], path)] == [
         "7",
         "3",
     ] and built[1:] == ["7", "3"]
