@@ -210,10 +210,10 @@ ROOMS = {
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
-    "kfcourse/records": 5_990,
+    "kfcourse/records": 5_850,
     "kfcourse/scenarios": 10_500,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_790,
+    "tests": 187_610,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
