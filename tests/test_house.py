@@ -206,14 +206,14 @@ ROOMS = {
     "kfcourse/*.py": 6_330,
     "kfcourse/continuous": 10_140,
     "kfcourse/filters": 32_380,
-    "kfcourse/lab": 19_160,
+    "kfcourse/lab": 19_100,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 5_850,
     "kfcourse/scenarios": 10_500,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_610,
+    "tests": 187_550,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -224,16 +224,6 @@ def test_the_share_of_a_linear_variant_is_that_of_the_riccati_equation():
     assert share == pytest.approx(riccati(STEPS), rel=4 * np.sqrt(2 / 10_000 / 10))
 
 
-def test_a_share_that_is_not_known_well_is_not_enough():
-    """Behind this meter 0.84 is left: below UNSEEN = 0.9, but by less than four standard errors of
-    256 trajectories."""
-    sharp = variant("0.9*x + 0.3*v", "x + f*w", {"f": 3.5})
-    few, many = (examine(sharp, runs).findings["observable"] for runs in (256, 8_000))
-    assert few.value < 0.9
-    assert not few.ok
-    assert many.ok
-
-
 def test_linear_is_linear_in_state_and_noise():
     assert is_linear(SHIPPED["1"].model)
     assert is_linear(Model.define(["x1 + 0.1*x2 + v1", "x2"], ["(x1 + 1)**2 - x1**2 + w1"]))
