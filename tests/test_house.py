@@ -211,9 +211,9 @@ ROOMS = {
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 5_850,
-    "kfcourse/scenarios": 10_500,
+    "kfcourse/scenarios": 10_110,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_550,
+    "tests": 187_110,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
