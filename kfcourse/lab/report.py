@@ -60,8 +60,7 @@ def write_report(
     `known` are the filters that the model may admit, of which the report has a table; `modes` are
     the `recognised_modes`.
     """
-    report = _report(result, language, known)
-    report.recognised = modes
+    report = _report(result, language, known, modes)
     content = {
         "blocks": list(report.blocks()),
         "words": report.words,
@@ -78,11 +77,9 @@ def write_report(
         return [folder / path.name for path in place.iterdir()]
 
 
-def _report(
-    result: Comparison, language: str = "en", known: Sequence[Admission] = ()
-) -> StudentReport:
+def _report(result: Comparison, language: str = "en", *more: Any) -> StudentReport:
     jumps = isinstance(result.model, JumpModel)
-    return (JumpReport if jumps else StudentReport)(result, WORDS[language], known)
+    return (JumpReport if jumps else StudentReport)(result, WORDS[language], *more)
 
 
 def remarks_in_words(result: Comparison) -> list[str]:

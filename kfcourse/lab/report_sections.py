@@ -4,6 +4,7 @@ comparison and conclusion; of models with modes see `report_modes`."""
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -43,6 +44,7 @@ from kfcourse.symbolic.writing import formula_latex, number_latex
 
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
+SHOWN = (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000)  # steps in tables
 
 # Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
 # gives.
@@ -76,13 +78,16 @@ class StudentReport:
     """The blocks of the report, section by section."""
 
     def __init__(
-        self, result: Comparison, words: dict[str, str], known: Sequence[Admission] = ()
+        self,
+        result: Comparison,
+        words: dict[str, str],
+        known: Sequence[Admission] = (),
+        recognised: Recognised | None = None,
     ) -> None:
-        self.result, self.words, self.known = result, words, known
+        self.result, self.words, self.known, self.recognised = result, words, known, recognised
         self.model: Any = result.model
         self.structures = Structures.of(self.model)
         self.modes, self.jumps = modes_of(self.model), self.structures.jumps
-        self.recognised: Recognised | None = None
         # of an object that moves in continuous time: some words are others
         self.moves = self.modes[0].between
         self.kind, self.numbers = "", {}
@@ -154,21 +159,24 @@ class StudentReport:
             added = enumerate(moves.correction, 1)
             yield formulas([rf"\Delta a_{i} &= {formula_latex(of, model.x)}" for i, of in added])
         names = dict.fromkeys(name for mode in self.modes for name in mode.values)
-        common = [
-            name for name in names if len({mode.values.get(name) for mode in self.modes}) == 1
-        ]
-        values = ", ".join(
-            f"${sp.latex(name)} = {number_latex(float(self.modes[0].values[name]))}$"
-            for name in common
-        )
-        if values:
-            yield self.text("common_parameters" if self.jumps else "parameters", values=values)
+        # of each mode; "-" where it has no such parameter
+        values = {
+            sp.latex(name): [
+                number_latex(float(mode.values[name])) if name in mode.values else "-"
+                for mode in self.modes
+            ]
+            for name in names
+        }
+        common = {name: texts[0] for name, texts in values.items() if len({*texts}) == 1}
+        own = {name: texts for name, texts in values.items() if name not in common}
+        if common:
+            listed = ", ".join(f"${name} = {text}$" for name, text in common.items())
+            yield self.text("common_parameters" if self.jumps else "parameters", values=listed)
         if self.jumps:
-            own = [name for name in names if name not in common]
-            heading = ["$j$", words["mode"], *(f"${sp.latex(name)}$" for name in own)]
+            heading = ["$j$", words["mode"], *(f"${name}$" for name in own)]
             rows = [
-                [f"${j}$", name, *(_value(mode, key) for key in own)]
-                for j, (name, mode) in enumerate(zip(model.names, self.modes, strict=True), 1)
+                [f"${j + 1}$", name, *(f"${texts[j]}$" for texts in own.values())]
+                for j, name in enumerate(model.names)
             ]
             yield Block("table", words["modes_table"], heading, rows)
         yield self.text("laws")
@@ -440,24 +448,21 @@ class StudentReport:
         """The conclusion: who leads and who is last, on how many steps, and how far from the
         bound."""
         result, words = self.result, self.words
-        alone = [best for best, others, _ in verdicts if not others]
-        for name in sorted(set(alone), key=lambda name: -alone.count(name)):
-            steps = [
-                k for k, (best, others, _) in enumerate(verdicts) if best == name and not others
-            ]
+        alone: dict[str, list[int]] = {}
+        for k, (best, others, _) in enumerate(verdicts):
+            if not others:
+                alone.setdefault(best, []).append(k)
+        for name, steps in sorted(alone.items(), key=lambda item: -len(item[1])):
             yield self.phrase("leads", name=self.title(name), at=self.at(steps))
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
         if alone and unsure:  # without a leader it is every step, as has been said
             yield self.phrase("together", at=self.at(unsure))
-        last = [worst for _, _, worst in verdicts if worst]
-        if last:
-            name = max(set(last), key=lambda name: (last.count(name), name))
-            yield self.phrase(
-                "last", name=self.title(name), steps=last.count(name), all=result.steps
-            )
-        else:
+        last = Counter(worst for _, _, worst in verdicts if worst).most_common(1)
+        for name, count in last:
+            yield self.phrase("last", name=self.title(name), steps=count, all=result.steps)
+        if not last:
             yield words["nobody_last"]
         # the control, or its equal
         leads = not result.has_bound and abs(float(result.ranking()[0][1].value)) < ALIKE
@@ -493,11 +498,6 @@ class StudentReport:
         return title(name, self.words)
 
 
-def _value(mode: Model, name: sp.Symbol) -> str:
-    """A parameter's value in a mode, if it is one there."""
-    return f"${number_latex(float(mode.values[name]))}$" if name in mode.values else "–"
-
-
 def score_cells(result: Comparison, name: str) -> list[str]:
     """Log score of a filter's predictions, how far it is below the reference's, and CRPS: means
     over the steps and half of their intervals."""
@@ -513,9 +513,4 @@ def score_cells(result: Comparison, name: str) -> list[str]:
 
 def table_steps(result: Comparison) -> list[int]:
     """The first steps and then some, to the last."""
-    steps = [
-        k
-        for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000)
-        if k < result.steps
-    ]
-    return steps if steps[-1] == result.steps - 1 else [*steps, result.steps - 1]
+    return [k for k in SHOWN if k < result.steps - 1] + [result.steps - 1]
