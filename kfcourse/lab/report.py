@@ -190,14 +190,8 @@ def conclusions(result: Comparison) -> list[str]:
 
 
 def _three_digits(value: float) -> str:
-    """Three digits, or all before the point; a power of ten only for what is beyond all measure."""
-    if abs(value) >= 1e12:
-        return f"{value:.3g}"
-    return (
-        f"{value:.0f}"
-        if abs(value) >= 1000
-        else np.format_float_positional(value, 3, fractional=False, trim="-")
-    )
+    """Three digits, and no power of ten."""
+    return np.format_float_positional(value, 3, fractional=False, trim="-")
 
 
 def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> Recognised | None:

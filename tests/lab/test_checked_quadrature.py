@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 from kfcourse import JumpModel, Model, NoClosedForm, gauss_hermite, lab_filters, simulate
 from kfcourse.filters import aof, logic_dynamic
@@ -79,19 +78,6 @@ def test_on_the_landing_a_fine_rule_finds_the_same():
                 sd = np.sqrt(np.diagonal(full, axis1=1, axis2=2))
                 assert (np.abs(ours - exact) < 4 * cq.CLOSE * sd).all()
                 assert (np.abs(covs - full) < 4 * cq.CLOSE * sd[:, :, None] * sd[:, None, :]).all()
-
-
-def test_a_mode_with_formulas_keeps_them_beside_one_without():
-    model = JumpModel.define(
-        "0.9*x + v",
-        "x + w",
-        modes={"sound": {}, "bent": {"state": "x/(1 + x**2) + v"}},
-        transition=[0.7, 0.3],
-    )
-    plain, by_points = checked(model).structures
-    assert plain.formulas is not None and by_points.formulas is None
-    tau, theta = plain.predict(np.full((3, 1), 2.0), np.full((3, 1, 1), 0.5))
-    assert_allclose((tau[:, 0], theta[:, 0, 0]), (np.full(3, 1.8), np.full(3, 1.405)), rtol=1e-15)
 
 
 def test_modes_for_which_no_order_does_leave_the_others_linearised_and_say_so():
