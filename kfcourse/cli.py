@@ -270,7 +270,7 @@ def _tell(result: Comparison, to_error: bool) -> None:
         lines.append("Predictions of the measurement, mean over the steps and 95 % interval:")
         rows = [["", "log score", f"below {title(result.reference)}", "CRPS"]]
         rows += [[title(name), *score_cells(result, name)] for name in result.names]
-        lines += ["{:<18} {:>19} {:>19} {:>19}".format(*row) for row in rows]
+        lines += admission.aligned(rows)
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 
@@ -290,13 +290,11 @@ def _writing(folder: Path) -> Iterator[None]:
 
 
 @main.command()
-@click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
+@click.argument("variant")
 @VARIANTS
-def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
-    """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
-    if len(places) > 2 or (len(places) == 2 and variants_file):
-        raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
-    chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
+def filters(variant: str, variants_file: Path | None) -> None:
+    """Say of each filter whether VARIANT admits it, and why not."""
+    chosen = find_variant(variant, variants_file)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
     click.echo(admission.table(admission.admissions(chosen.model, seconds=DERIVATION)))
 
