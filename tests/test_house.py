@@ -211,7 +211,7 @@ ROOMS = {
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 5_810,
-    "kfcourse/scenarios": 10_110,
+    "kfcourse/scenarios": 10_030,
     "kfcourse/symbolic": 20_980,
     "tests": 186_570,
 }

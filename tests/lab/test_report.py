@@ -144,9 +144,9 @@ class Told:
 
 
 def report(language, **changes):
-    told = Told()
-    vars(told).update(changes)
-    return StudentReport(told, WORDS[language])
+    student = Told()
+    vars(student).update(changes)
+    return StudentReport(student, WORDS[language])
 
 
 def sentences(leaders, last, language):
@@ -202,18 +202,18 @@ def test_a_filter_that_equals_the_control_but_for_rounding_is_not_told_a_differe
     1e-16."""
     gaps = {"fos-gaussian": apart, "aof-gaussian": 0.0, "duof": 0.3}
     ranked = [(name, Estimate(np.array(value), np.array(0.01), 9)) for name, value in gaps.items()]
-    told = report(language, has_bound=False, ranking=lambda: ranked)
-    *_, last = told.sentences([Verdict("aof-gaussian", [], "duof")] * 51)
-    assert last == told.mean_sentence(key) and "e-" not in last
-    assert told.title("aof-gaussian" if key == "mean_first" else "fos-gaussian") in last
+    student = report(language, has_bound=False, ranking=lambda: ranked)
+    *_, last = student.sentences([Verdict("aof-gaussian", [], "duof")] * 51)
+    assert last == student.mean_sentence(key) and "e-" not in last
+    assert student.title("aof-gaussian" if key == "mean_first" else "fos-gaussian") in last
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_filter_that_diverges_is_no_last_with_a_number(language):
     lost = {"fos-gaussian": np.ones(51, dtype=bool)}
-    told = report(language, lost=lost)
-    sentence = told.mean_sentence("mean_bound")
-    assert told.title("duof") in sentence and told.title("fos-gaussian") not in sentence
+    student = report(language, lost=lost)
+    sentence = student.mean_sentence("mean_bound")
+    assert student.title("duof") in sentence and student.title("fos-gaussian") not in sentence
     alone = report(language, lost=lost | {"duof": lost["fos-gaussian"]})
     assert alone.mean_sentence("mean_bound").endswith(alone.title("aof-gaussian") + ".")
 
