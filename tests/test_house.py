@@ -206,7 +206,7 @@ ROOMS = {
     "kfcourse/*.py": 6_260,
     "kfcourse/continuous": 10_140,
     "kfcourse/filters": 32_380,
-    "kfcourse/lab": 19_010,
+    "kfcourse/lab": 19_000,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,

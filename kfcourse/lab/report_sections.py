@@ -88,12 +88,11 @@ class StudentReport:
         self.model: Any = result.model
         self.structures = Structures.of(self.model)
         self.modes, self.jumps = modes_of(self.model), self.structures.jumps
-        # of an object that moves in continuous time: some words are others
-        self.moves = self.modes[0].between
-        self.kind, self.numbers = "", {}
+        # of an object that moves in continuous time, and of one with modes, some words are others
+        self.moves, self.numbers = self.modes[0].between, {}
+        self.kind = "_modes" if self.jumps else "_between" if self.moves is not None else ""
         if self.moves is not None:
             accuracy = number_latex(self.moves.accuracy)
-            self.kind = "_between"
             self.numbers = {"substeps": self.moves.substeps, "accuracy": accuracy}
         self.scalar = self.model.n == self.model.p == 1
         used = {entry(name).functions for name in result.names}
@@ -152,7 +151,7 @@ class StudentReport:
     def task(self) -> Iterator[Block]:
         model, moves, words = self.model, self.moves, self.words
         yield self.section("task")
-        yield self.text("task_modes_text" if self.jumps else "task_text", modes=len(self.modes))
+        yield self.text("task_text", modes=len(self.modes))
         yield from self.in_modes(self.equations)
         if moves is not None and any(moves.correction):
             yield self.text("stratonovich")
@@ -171,7 +170,7 @@ class StudentReport:
         own = {name: texts for name, texts in values.items() if name not in common}
         if common:
             listed = ", ".join(f"${name} = {text}$" for name, text in common.items())
-            yield self.text("common_parameters" if self.jumps else "parameters", values=listed)
+            yield self.text("parameters", values=listed)
         if self.jumps:
             heading = ["$j$", words["mode"], *(f"${name}$" for name in own)]
             rows = [
@@ -197,7 +196,7 @@ class StudentReport:
             yield formulas([chain, rf"q &= {matrix(model.first[None])}"])
         yield self.text("independent")
         titles = ", ".join(map(self.title, self.result.entrants))
-        yield self.text("find_modes" if self.jumps else "find", filters=titles)
+        yield self.text("find", filters=titles)
 
     def in_modes(
         self, make: Callable[[Model], Iterable[Block]], every: str = ""
