@@ -1,5 +1,4 @@
-"""Smoothers and likelihoods: one dense regression on linear models, the likeliest trajectory, brute force, and
-published figures."""
+"""Smoothers and likelihoods: one dense regression on linear models, the likeliest trajectory, angles."""
 
 import numpy as np
 import oracles
@@ -22,7 +21,6 @@ from kfcourse import (
 )
 from kfcourse.filters import aof, duof, imm, iterated, kalman_filter, pointmass
 from kfcourse.records import smooth_iterated
-from kfcourse.scenarios.benchmarks import PUBLISHED, pendulum, pendulum_data
 from kfcourse.symbolic.equations import compile_noiseless
 
 pytestmark = pytest.mark.quick
@@ -114,19 +112,6 @@ def test_with_a_lag_it_is_the_smoother_of_what_is_known_then(changing, record, l
 
 
 # ---------------------------------------------------------------- nonlinear
-
-
-@pytest.mark.parametrize(
-    ("name", "build"),
-    [("EKF", linearised), ("UKF", unscented)],
-)
-def test_the_pendulum_s_smoothers_have_their_published_errors(name, build):
-    x, y = pendulum_data()
-    mean = smooth(aof(build(pendulum())), y).mean[1:, 0, 0]
-    # 500 steps there and back round differently in another order of operations
-    assert np.sqrt(np.mean((mean - x[:, 0]) ** 2)) == pytest.approx(
-        PUBLISHED["pendulum_smoothed"][name], rel=1e-12
-    )
 
 
 def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
