@@ -331,10 +331,7 @@ def test_fuse_says_what_is_wrong(changes, message):
         fuse(**{**usual, "observations": [], **changes})
 
 
-@pytest.mark.parametrize(
-    ("times", "readings"),
-    [([0, 1, 2], [9, 7, 5]), ([1, np.nan, 3], [1, 2, 3]), ([1], [1])],
-)
-def test_no_clock_runs_backwards(times, readings):
+@pytest.mark.parametrize("readings", [[9, 7, 5], [1, np.nan, 3], [1, 1, 1]])
+def test_no_clock_runs_backwards(readings):
     with pytest.raises(ValueError, match="readings"):
-        Clock.fit(times, readings)
+        Clock.fit([0, 1, 2], readings)
