@@ -109,19 +109,12 @@ def test_the_practitioner_s_track(place):
     assert_array_equal(behind.smoothed.mean, smooth(filter_, record.y).mean)
 
 
-def test_a_long_curve_is_a_picture_and_twenty_lags_are_drawn(place):
+def test_a_long_curve_is_a_picture():
     ax = Figure().add_subplot()
     for size in (5000, 5001):
         ax.plot(np.zeros(size))
         own_data._labelled(ax, "time", "x")
         assert (ax.get_rasterization_zorder() == 3) == (size == 5001)
-    ax = Figure().add_subplot()
-    times, _, y = practitioner_s_track(2)
-    written(place / "track.csv", times, y)
-    analysis = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"))
-    passed = analysis.examined.passed[:, 0, 0]
-    own_data._whiteness(own_data.columns_of(analysis), "y1", passed, ax)
-    assert len(ax.lines[0].get_xdata()) == 20
 
 
 def test_the_command_writes_numbers_and_a_report(call, place):

@@ -590,20 +590,19 @@ def test_the_numbers_are_those_of_the_comparison(results, tmp_path):
         for name in ("53", "20")
     )
     result = results["53"]
-    assert list(data["error_variance"]) == list(result.names)
-    for name in result.names:
-        estimate = result.error_variance(name)
-        assert data["error_variance"][name] == estimate.value.tolist()  # every digit
-        assert data["standard_error"][name] == estimate.standard_error.tolist()
     assert (data["variant"], data["runs"], data["steps"], data["seed"]) == ("53", 300, 4, 1)
     assert data["model"]["parameters"] == {"c": 0.9, "e": 0.05, "g": 1.0, "f": 0.02}
-    for key in ("above_bound", "above_bound_standard_error", "mean_above_bound", "score"):
-        assert set(data[key]) == set(LAB), key
-    for name in LAB:
-        gap, mean = result.gap(name), result.mean_gap(name)
-        assert data["above_bound"][name] == gap.value.tolist()
-        assert data["mean_above_bound"][name]["value"] == float(mean.value)
-    assert "above_bound" not in without
+    for key, errors, estimate, names in (
+        ("error_variance", "standard_error", result.error_variance, result.names),
+        ("above_bound", "above_bound_standard_error", result.gap, LAB),
+    ):
+        for name, value in zip(names, map(estimate, names), strict=True):
+            assert data[key][name] == value.value.tolist()  # every digit
+            assert data[errors][name] == value.standard_error.tolist()
+        assert {*data[key]} == {*names}
+    means = {name: entry["value"] for name, entry in data["mean_above_bound"].items()}
+    assert means == {name: float(result.mean_gap(name).value) for name in LAB}
+    assert {*data["score"]} == {*LAB} and "above_bound" not in without
 
 
 def test_without_the_exact_filter_the_control_is_the_zero_line(written):
