@@ -210,10 +210,10 @@ ROOMS = {
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
-    "kfcourse/records": 5_810,
+    "kfcourse/records": 5_670,
     "kfcourse/scenarios": 10_030,
     "kfcourse/symbolic": 20_980,
-    "tests": 184_630,
+    "tests": 184_580,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

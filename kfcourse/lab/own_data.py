@@ -239,7 +239,7 @@ def write_record(result: Analysis, folder: Path) -> None:
 def _labelled(ax: Axes, across: str, up: str) -> None:
     ax.set(xlabel=across, ylabel=up)
     ax.grid(True, alpha=0.3)
-    if max(len(line.get_xdata()) for line in ax.lines) > PICTURE:
+    if max(np.size(line.get_xdata()) for line in ax.lines) > PICTURE:
         ax.set_rasterization_zorder(3)  # all but the legend
     if ax.get_legend_handles_labels()[1]:
         ax.legend(fontsize="small")

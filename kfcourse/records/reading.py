@@ -118,7 +118,11 @@ def read_measurements(
         name: table.held(values[name], named[name]) for name in model.known.inputs if name in values
     }
     single = float(model.known.interval)
-    times = _times(table, named, values, single)
+    times = (
+        _times(table, values["time"], named["time"])
+        if "time" in named
+        else single * np.arange(len(table.rows))
+    )
     used = {symbol.name for symbol in model.known.symbols}
     if "t" in used - set(model.known.inputs):
         inputs["t"] = times
@@ -236,18 +240,16 @@ def _table(path: Path) -> _Table:
 def _columns(table: _Table, model: Model, given: Mapping[str, str]) -> dict[str, str]:
     """The column of each thing that the model needs, by the model's names."""
     wanted = [*model.measured, *(name for name in model.known.inputs if name != INTERVAL)]
-    known = sorted({*wanted, INTERVAL, "time"})
+    known = sorted({*wanted, "time"})
     if unknown := sorted(set(given) - set(known)):
         raise RecordError(
             f"columns are given for {', '.join(unknown)}; the model needs {', '.join(known)}"
         )
     named = {name: given.get(name, name) for name in wanted}
     clocks = [name for name in ("time", "t") if name in table.names and name not in wanted]
-    interval, needed = given.get(INTERVAL, INTERVAL), INTERVAL in model.known.inputs
+    needed = INTERVAL in model.known.inputs
     if "time" in given or clocks:
         named["time"] = given.get("time") or clocks[0]
-    elif needed and interval in table.names:
-        named[INTERVAL] = interval
     elif needed or table.similar("time") not in (None, *named.values()):
         problem = table.missing("time", "time")
         if needed or "t" in {symbol.name for symbol in model.known.symbols}:
@@ -259,19 +261,8 @@ def _columns(table: _Table, model: Model, given: Mapping[str, str]) -> dict[str,
     return named
 
 
-def _times(
-    table: _Table, named: Mapping[str, str], values: Mapping[str, Array], interval: float
-) -> Array:
-    """Times of the rows, from their column, from that of intervals, or by the model's; RecordError
-    if they go back."""
-    if "time" not in values:
-        steps = values.get(INTERVAL, np.full(len(table.rows), interval))
-        if (steps < 0).any():
-            row = int(np.argmax(steps < 0))
-            raise table.error(row, named[INTERVAL], "an interval must not be negative")
-        held = table.held(steps, named.get(INTERVAL, INTERVAL))
-        return np.concatenate([[0.0], np.cumsum(held[:-1])])
-    times, column = values["time"], named["time"]
+def _times(table: _Table, times: Array, column: str) -> Array:
+    """Times of the rows; RecordError if one is missing, or they go back."""
     if (empty := np.isnan(times)).any():
         raise table.error(int(np.argmax(empty)), column, "empty; every row needs its time")
     if (back := np.diff(times) < 0).any():

@@ -77,17 +77,11 @@ def test_columns_may_have_other_names(read):
     with pytest.raises(RecordError, match=r"no column 'north'.*--column y1=\.\.\."):
         read(content, columns={"time": "seconds", "y1": "north", "a": "push"})
     with pytest.raises(
-        RecordError, match="columns are given for b; the model needs a, dt, time, y1, y2"
+        RecordError, match="columns are given for b; the model needs a, time, y1, y2"
     ):
         read(content, columns={"b": "push"})
     with pytest.raises(RecordError, match="no column 'minutes'"):
         read(GOOD, columns={"time": "minutes"})
-
-
-def test_the_interval_may_be_a_column_where_there_are_no_times(read):
-    record = read("dt,y1,y2,a\n0.5,1,2,3\n1.5,1,2,3\n1,1,2,3\n")
-    assert_array_equal(record.times, [0, 0.5, 2])
-    assert record.model.known.inputs["dt"] == (0.5, 1.5, 1.0)
 
 
 def test_the_time_in_formulas_is_the_recorded_one(read):
@@ -144,7 +138,7 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
         (GOOD.replace(",2\n", ",\n"), "column a: an input needs a value from the first row"),
         (GOOD.replace("1.5", '"1.5'), "line 2.*a quoted cell must end in its line"),
         ("time,y1,y2,a\n0,1,,3\n1,2,,3\n", "column y2 has no number at all"),
-        ("dt,y1,y2,a\n1,1,2,3\n-1,1,2,3\n", "line 3, column dt: an interval must not be negative"),
+        ("dt,y1,y2,a\n1,1,2,3\n", "no column 'time'; .* the model needs the times"),
         (GOOD.encode("utf-16"), r"line 1: a byte that is not UTF-8 \(perhaps UTF-16"),
         (GOOD.replace("-3e0", "é").encode("latin-1"), "line 3: a byte that is not UTF-8"),
         # what people bring
