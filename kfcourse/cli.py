@@ -26,7 +26,6 @@ from kfcourse.lab import admission, grammar, quality
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import (
     LANGUAGES,
-    STANDARD_OUTPUT,
     conclusions,
     recognised_modes,
     remarks_in_words,
@@ -87,17 +86,14 @@ def _clear_errors() -> Iterator[None]:
             warnings.simplefilter("ignore", RuntimeWarning)
             warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
             yield
-    except (ValueError, NotFinite) as error:
+    except BrokenPipeError:
+        raise
+    except (ValueError, NotFinite, OSError) as error:
         raise click.ClickException(str(error)) from None
     except MemoryError:
         raise click.ClickException(
             "this needs more memory than there is; take fewer --runs, --steps or --jobs"
         ) from None
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        where = f": {error.filename}" if error.filename else ""
-        raise click.ClickException(f"{error.strerror or error}{where}") from None
     except KeyboardInterrupt:
         click.echo("Interrupted; files written before are as they were.", err=True)
         sys.exit(130)
@@ -111,12 +107,9 @@ class _Group(click.Group):
         return sorted([*self.commands, *INSTRUCTORS])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        instructors = name in INSTRUCTORS
-        return (
-            getattr(import_module("kfcourse.exercises.commands"), name)
-            if instructors
-            else self.commands.get(name)
-        )
+        if name in INSTRUCTORS:
+            return getattr(import_module("kfcourse.exercises.commands"), name)
+        return self.commands.get(name)
 
     def invoke(self, ctx: click.Context) -> object:
         with _clear_errors():
@@ -187,7 +180,7 @@ def main() -> None:
     "--json",
     "json_file",
     type=PATH,
-    help="Also write the numbers to this file; - is standard output.",
+    help="Also write the numbers to this file.",
 )
 def lab(
     variant: str,
@@ -245,21 +238,19 @@ def lab(
     result = replace(result, left_out={**refused, **result.left_out})
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
-    to_error = str(json_file) in STANDARD_OUTPUT
-    _tell(result, to_error)
+    click.echo(_ranking(result))
     if json_file:
         write_json(chosen, result, json_file)
     with _writing(folder):
         modes = recognised_modes(result, filters)
         write_report(chosen, result, folder, language, [*known.values()], modes)
     click.echo(
-        f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""),
-        err=to_error,
+        f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else "")
     )
 
 
-def _tell(result: Comparison, to_error: bool) -> None:
-    """The ranking; to standard error if standard output takes the numbers."""
+def _ranking(result: Comparison) -> str:
+    """The ranking, remarks and conclusions."""
     lines = [
         f"D_k above that of {title(result.reference)}, %, mean over the steps ± standard error:"
     ]
@@ -271,7 +262,7 @@ def _tell(result: Comparison, to_error: bool) -> None:
         rows = [["", "log score", f"below {title(result.reference)}", "CRPS"]]
         rows += [[title(name), *score_cells(result, name)] for name in result.names]
         lines += admission.aligned(rows)
-    click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
+    return "\n".join([*lines, *remarks_in_words(result), *conclusions(result)])
 
 
 @contextmanager
@@ -529,8 +520,7 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
             f"the report cannot go to {folder}: {there} is no folder to write to; choose another "
             f"one with --out"
         )
-    named = str(json_file) not in STANDARD_OUTPUT
-    if json_file and named and (json_file.is_dir() or not json_file.parent.is_dir()):
+    if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
         raise click.ClickException(
             f"the numbers cannot go to {json_file}: name a file in an existing folder with --json"
         )

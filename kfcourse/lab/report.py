@@ -41,7 +41,6 @@ from kfcourse.symbolic.markup import mathml
 
 LANGUAGES = tuple(WORDS)
 RECOGNISED = 1600  # trajectories on which modes are told
-STANDARD_OUTPUT = ("-", "/dev/stdout")
 # the line's own &
 ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -153,10 +152,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         data["mean_above_bound"] = {name: _number(result.mean_gap(name)) for name in ranking}
     # infinite and undefined numbers as null: JSON has none
     text = json.dumps(json.loads(json.dumps(data), parse_constant=lambda _: None), indent=1)
-    if str(path) in STANDARD_OUTPUT:
-        print(text, flush=True)
-    else:
-        save(text, path)
+    save(text, path)
     return path
 
 
