@@ -206,14 +206,14 @@ ROOMS = {
     "kfcourse/*.py": 6_200,
     "kfcourse/continuous": 10_140,
     "kfcourse/filters": 32_380,
-    "kfcourse/lab": 18_980,
+    "kfcourse/lab": 18_970,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
     "kfcourse/records": 5_670,
-    "kfcourse/scenarios": 10_030,
+    "kfcourse/scenarios": 10_000,
     "kfcourse/symbolic": 20_980,
-    "tests": 184_580,
+    "tests": 184_570,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

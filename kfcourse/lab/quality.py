@@ -25,7 +25,7 @@ import joblib
 import numpy as np
 from tqdm import tqdm
 
-from kfcourse.errors import NoClosedForm, NotFinite, Reason
+from kfcourse.errors import NoClosedForm, NotFinite
 from kfcourse.lab.admission import admissions, aligned
 from kfcourse.lab.short_names import LAB, Structures, operations, title
 from kfcourse.lab.variants import RUNS, Variant
@@ -107,8 +107,6 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
         Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None;
         `kfcourse.exercises.checks.posing.unposed`.
     """
-    if runs < FEWEST:
-        raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
     model = variant.model
     with np.errstate(all="ignore"):  # what diverges is said in the findings
         if isinstance(model, JumpModel):
@@ -154,11 +152,11 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
         return {"bounded": moments}
     try:
         result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
-        failures: list[Reason] = [*result.left_out.values()]
+        failures = [str(reason) for reason in result.left_out.values()]
     except NotFinite as error:
-        failures = [error]
+        failures = [str(error)]
     if failures:
-        return {"bounded": Finding(False, str(failures[0]), moments.value)}
+        return {"bounded": Finding(False, failures[0], moments.value)}
     return {
         "bounded": not_diverging(result, x) or moments,
         "observable": observable(result, x),

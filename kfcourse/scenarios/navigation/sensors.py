@@ -107,8 +107,6 @@ class Sensor:
         timing = {"latency": self.latency, "jitter": self.jitter}
         expect_not_negative(**{f"{self.name}: {name}": value for name, value in timing.items()})
         expect_positive(**{f"{self.name}: the period": self.period})
-        if not math.isfinite(self.offset):
-            raise ValueError(f"{self.name}: offset must be finite, got {self.offset}")
         if self.model.timed:
             raise ModelError(
                 f"{self.name}: the meter depends on the step, {self.model.known.symbols}, but a "
