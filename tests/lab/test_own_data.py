@@ -15,6 +15,7 @@ from kfcourse.filters import aof, gated
 from kfcourse.lab import own_data
 from kfcourse.lab.own_data import estimate_record, model_of
 from kfcourse.records import estimate
+from kfcourse.scenarios.irregular import irregular_track
 
 MODELS = """
 [variants.plane]
@@ -22,7 +23,7 @@ title = "a walk <b>in</b> the plane"
 state = ["x + dt*u + dt*sqrt(q*dt)*v1/2", "z + dt*s + dt*sqrt(q*dt)*v2/2", "u + sqrt(q*dt)*v1", "s + sqrt(q*dt)*v2"]
 meter = ["x + sqrt(r)*w1", "z + sqrt(r)*w2"]
 symbols = { x = ["x", "z", "u", "s"] }
-parameters = { q = 0.1, r = 3.0 }
+parameters = { q = 0.2, r = 4.0 }
 inputs = { dt = [1] }
 prior = { mean = [0, 0, 0, 0], variance = [100, 100, 200, 200] }
 
@@ -40,19 +41,8 @@ inputs = { u = [1] }
 
 def practitioner_s_track(seed):
     """300 unequal steps, 15 % missing, 5 % outliers: times, states, measurements."""
-    rng = np.random.default_rng(seed)
-    dt = rng.uniform(0.1, 1.5, 299)
-    times, x = np.concatenate([[0], np.cumsum(dt)]), np.zeros((300, 4))
-    x[0] = [0, 0, 10, 5]
-    for k, step in enumerate(dt):
-        push = np.sqrt(0.1 * step) * rng.standard_normal(2)
-        x[k + 1, 2:] = x[k, 2:] + push
-        x[k + 1, :2] = x[k, :2] + step * x[k, 2:] + step * push / 2
-    y = x[:, :2] + np.sqrt(3) * rng.standard_normal((300, 2))
-    off = rng.random(300) < 0.05
-    y[off] += rng.normal(0, 45, size=(off.sum(), 2))
-    y[rng.random(300) < 0.15] = np.nan
-    return times, x, y
+    track = irregular_track(seed)
+    return track.time, track.x[:, 0], track.y[:, 0]
 
 
 def written(path, times, y):
