@@ -205,7 +205,7 @@ def lab(
     chosen = find_variant(variant, variants_file)
     model = chosen.model
     entries, usual = (FILTERS, LAB) if isinstance(model, Model) else (JUMP_FILTERS, JUMP_LAB)
-    bound = bound or has_exact(model)
+    bound = names is None and (bound or has_exact(model))
     wanted = [*usual, *[EXACT] * bound] if names is None else _names(names)
     if names is None and not bound:
         click.echo(

@@ -76,9 +76,14 @@ def write_report(
         return [folder / path.name for path in place.iterdir()]
 
 
-def _report(result: Comparison, language: str = "en", *more: Any) -> StudentReport:
+def _report(
+    result: Comparison,
+    language: str = "en",
+    known: Sequence[Admission] = (),
+    modes: Recognised | None = None,
+) -> StudentReport:
     jumps = isinstance(result.model, JumpModel)
-    return (JumpReport if jumps else StudentReport)(result, WORDS[language], *more)
+    return (JumpReport if jumps else StudentReport)(result, WORDS[language], known, modes)
 
 
 def remarks_in_words(result: Comparison) -> list[str]:

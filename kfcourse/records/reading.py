@@ -34,10 +34,10 @@ from kfcourse.symbolic.reading import shown
 INTERVAL = "dt"
 UNEVEN = 0.01  # intervals that differ by more than this part of their median are not of one length
 # What to do about a cell that is no number, by the first pattern that is found in it.
+DATE = r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d"
 ADVICE = {
-    r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d": "a date or a clock's time: write "
-    "seconds, such as datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour "
-    "twice",
+    DATE: "a date or a clock's time: write seconds, such as "
+    "datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour twice",
     "\u2212": "its sign is a typographic minus (U+2212): write the hyphen, -",
     ",": "if the comma separates decimals, separate cells by semicolons",
     r"^\D*$": "if this is a line of units, delete it: measurements begin below the names; leave a "

@@ -93,7 +93,7 @@ def aircraft(
     Raises
     ------
     ValueError
-        A number that is not positive and finite, a manoeuvre shorter than its two ramps, a flight
+        A number that is not positive and finite, a manoeuvre no longer than its two ramps, a flight
         that ends below the ground.
     """
     expect_positive(interval=interval, ramp=ramp)
@@ -105,10 +105,10 @@ def aircraft(
     circles = [angle / rate + ramp for angle, rate in zip(TURNS, rates, strict=True)]
     lengths = [DURATIONS[0], circles[0], DURATIONS[1], circles[1], DURATIONS[2]]
     for number, length in zip((2, 3, 4, 5), lengths[1:], strict=True):
-        if length < 2 * ramp:
+        if length <= 2 * ramp:
             raise ValueError(
-                f"part {number} lasts {length:.4g} s, less than its two ramps of {ramp:g} s; make "
-                f"it longer or the ramp shorter"
+                f"part {number} lasts {length:.4g} s, no longer than its two ramps of {ramp:g} s; "
+                f"make it longer or the ramp shorter"
             )
     ends = np.cumsum(lengths)
     time = interval * np.arange(int(ends[-1] / interval * (1 + 1e-12)) + 1)

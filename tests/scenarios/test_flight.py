@@ -61,7 +61,7 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
         ({"interval": 0.0}, "interval must be positive"),
         ({"speeds": (200.0, -1.0)}, "speeds must be positive"),
         ({"radii": (6e3, np.inf)}, "radii must be positive and finite"),
-        ({"ramp": 31.0}, "part 3 lasts 60 s, less than its two ramps"),
+        ({"ramp": 30.0}, "part 3 lasts 60 s, no longer than its two ramps"),
         ({"descent": 40.0}, "lower `descent`"),
     ],
 )
