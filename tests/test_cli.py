@@ -131,15 +131,6 @@ def test_the_lab_of_variant_53(call, no_figures, tmp_path):
     assert str(Path("report") / "report.html") in result.output
 
 
-@pytest.mark.slow
-def test_every_filter_can_be_chosen(call, no_report, tmp_path):
-    result = call("lab 53", QUICK, "--filters", ",".join(FILTERS), "--json n.json")
-    assert result.exit_code == 0, result.output
-    assert set(
-        json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]
-    ) == set(FILTERS)
-
-
 def test_a_vector_variant_works(call, no_figures, tmp_path):
     """Without a bound, unless it is asked for: that is one of particles."""
     for options, names, bounded in (("", {*LAB}, False), ("--bound", {*LAB, "aof-exact"}, True)):

@@ -33,8 +33,8 @@ from kfcourse.symbolic.reading import shown
 
 INTERVAL = "dt"
 UNEVEN = 0.01  # intervals that differ by more than this part of their median are not of one length
-# What to do about a cell that is no number, by the first pattern that is found in it.
 DATE = r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d"
+# What to do about a cell that is no number, by the first pattern that is found in it.
 ADVICE = {
     DATE: "a date or a clock's time: write seconds, such as "
     "datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour twice",

@@ -237,17 +237,3 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, argumen
     for word in words:
         assert word in result.output
     assert sorted(place.iterdir()) == before
-
-
-def test_a_report_that_fails_leaves_what_was_there(no_figures, call, place, monkeypatch):
-    call = partial(call, "line.csv --model my.toml --variant line --out out")
-    assert call().exit_code == 0
-    before = {path: path.read_bytes() for path in (place / "out").iterdir()}
-
-    def broken(*_):
-        raise RuntimeError("no pictures today")
-
-    monkeypatch.setattr(own_data, "save_figure", broken)
-    result = call("--gate 0.9")
-    assert result.exit_code == 1 and "no pictures today" in result.output
-    assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before

@@ -168,24 +168,6 @@ def test_nobody_gets_a_variant_with_modes_and_it_is_said(command, tmp_path, own,
         )
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ("0.1], [0.4", "0.2], [0.4"),
-        ("transition", "transitions"),
-    ],
-)
-def test_a_wrong_table_is_refused_with_its_name(command, tmp_path, change, message):
-    path = tmp_path / "wrong.toml"
-    path.write_text(OWN.replace(change, message))
-    result = command("lab mine --variants", path)
-    assert (
-        result.exit_code == 1
-        and "variant mine in" in result.output
-        and "Traceback" not in result.output
-    )
-
-
 def test_the_share_of_right_modes_is_that_of_the_trajectories():
     model = JUMPS["J1-lasting"].model
     filter_ = logic_dynamic(Structures(model).gaussian, model.transition_at, model.first)
