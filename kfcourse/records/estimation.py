@@ -189,8 +189,7 @@ def _checked(
     model: Model, unknown: Sequence[str], positive: Sequence[str]
 ) -> tuple[tuple[str, ...], Array, Array]:
     """Names, whether each is positive, and values at the start."""
-    names = (unknown,) if isinstance(unknown, str) else tuple(unknown)
-    positive = (positive,) if isinstance(positive, str) else tuple(positive)
+    names = tuple(unknown)
     if not names or len(set(names)) < len(names) or not set(names) <= set(model.parameters):
         raise ModelError(
             f"unknown must name parameters of the model, each once: it has "

@@ -204,7 +204,7 @@ def _table(path: Path) -> _Table:
     text = read_text(path, RecordError)
     delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
     table = _Table(path, [], [], [])
-    for number, line in enumerate(text.rstrip().splitlines(), 1):
+    for number, line in enumerate(text.rstrip("\r\n ").splitlines(), 1):
         try:
             cells = next(csv.reader([line], delimiter=delimiter, strict=True)) or [""]
         except csv.Error as error:

@@ -178,5 +178,6 @@ def test_inputs_of_a_model_are_replaced_by_name():
 
 
 def test_an_input_holds_until_the_next_one(read):
-    record = read("time,y1,y2,a\n0,1,2,3\n1,1,2,4\n2,1,2,\n3,1,2,\n4,1,2,5\n")
-    assert record.model.known.inputs["a"] == (3.0, 4.0, 4.0, 4.0, 5.0)
+    content = "time,y1,y2,a\n0,1,2,3\n1,1,2,4\n2,1,2,\n3,1,2,5\n4,1,2,\n"
+    for record in (read(content), read(content.replace(",", "\t"))):
+        assert record.model.known.inputs["a"] == (3.0, 4.0, 4.0, 5.0, 5.0)
