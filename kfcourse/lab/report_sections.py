@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.errors import Reason
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.exact.laws import modes_of
@@ -123,6 +124,13 @@ class StudentReport:
     def text(self, key: str, **values: object) -> Block:
         return Block("text", self.phrase(key, **values))
 
+    def table(
+        self, key: str, heading: Iterable[str], rows: list[list[str]], **values: object
+    ) -> Block:
+        """A table below these words; what its columns are called, in words where there are some."""
+        columns = [self.words.get(cell, cell) for cell in heading]
+        return Block("table", self.phrase(key, **values), columns, rows)
+
     def translated(self, text: str) -> str:
         for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
             text = text.replace(english, rf"\text{{{self.words[key]}}}")
@@ -136,20 +144,18 @@ class StudentReport:
         yield from self.conclusion()
         if self.known:
             yield self.section("admitted")
-            words, why = self.words, partial(cause, model=self.model, words=self.words)
-            heading = [words["filter"], words["admitted_verdict"], words["admitted_why"]]
             rows = [
                 [
                     self.title(answer.name),
-                    words[f"admitted_{answer.verdict}"],
-                    why(answer.reason) if answer.reason else answer.says,
+                    self.words[f"admitted_{answer.verdict}"],
+                    self.cause(answer.reason) if answer.reason else answer.says,
                 ]
                 for answer in self.known
             ]
-            yield Block("table", words["admitted_text"], heading, rows)
+            yield self.table("admitted_text", ["filter", "admitted_verdict", "admitted_why"], rows)
 
     def task(self) -> Iterator[Block]:
-        model, moves, words = self.model, self.moves, self.words
+        model, moves = self.model, self.moves
         yield self.section("task")
         yield self.text("task_text", modes=len(self.modes))
         yield from self.in_modes(self.equations)
@@ -172,12 +178,12 @@ class StudentReport:
             listed = ", ".join(f"${name} = {text}$" for name, text in common.items())
             yield self.text("parameters", values=listed)
         if self.jumps:
-            heading = ["$j$", words["mode"], *(f"${name}$" for name in own)]
+            heading = ["$j$", "mode", *(f"${name}$" for name in own)]
             rows = [
                 [f"${j + 1}$", name, *(f"${texts[j]}$" for texts in own.values())]
                 for j, name in enumerate(model.names)
             ]
-            yield Block("table", words["modes_table"], heading, rows)
+            yield self.table("modes_table", heading, rows)
         yield self.text("laws")
         laws = [rf"x_0 &\sim {law(model.prior)}"]
         for symbol, noise in (("v_k", "state_noise"), ("w_k", "meter_noise"))[moves is not None :]:
@@ -369,8 +375,8 @@ class StudentReport:
                 [f"${k}$", *(power_of_ten(estimate[k]) for estimate in estimates)]
                 for k in table_steps(result)
             ]
-            caption = words["table_goes_on" if start else "table"]
-            yield Block("table", caption, ["$k$", *map(self.title, names)], rows)
+            key = "table_goes_on" if start else "table"
+            yield self.table(key, ["step", *map(self.title, names)], rows)
         for text in self.remarks():
             yield Block("text", text)
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
@@ -383,18 +389,16 @@ class StudentReport:
                 [self.title(name), words["diverges"] if name in result.lost else in_percent(gap)]
                 for name, gap in result.ranking()
             ]
-            caption = self.phrase("ranking_table", reference=reference)
-            yield Block("table", caption, [words["filter"], "%"], rows)
+            yield self.table("ranking_table", ["filter", "%"], rows, reference=reference)
         if result.scored:
             below = self.phrase("score_below", name=self.title(result.reference))
-            heading = [words["filter"], words["log_score"], below, "CRPS"]
             rows = [[self.title(name), *score_cells(result, name)] for name in result.names]
-            yield Block("table", self.phrase("scores_table", level=LEVEL), heading, rows)
+            heading = ["filter", "log_score", below, "CRPS"]
+            yield self.table("scores_table", heading, rows, level=LEVEL)
         if modes := self.recognised:
             rows = [[self.title(name), in_percent(share)] for name, share in modes.share.items()]
             guess = [words["guess"], f"${100 * modes.guess:.1f}$"]
-            heading = [words["filter"], words["share"]]
-            yield Block("table", words["share_table"], heading, [*rows, guess])
+            yield self.table("share_table", ["filter", "share"], [*rows, guess])
             yield Block("figure", words["figure_modes"], ["modes"])
 
     def remarks(self) -> Iterator[str]:
@@ -415,13 +419,11 @@ class StudentReport:
         """The filters that do not take part, and why, those with the same reason together."""
         names: dict[str, list[str]] = {}
         for name, reason in self.result.left_out.items():
-            names.setdefault(cause(reason, self.result.model, self.words), []).append(
-                self.title(name)
-            )
+            names.setdefault(self.cause(reason), []).append(self.title(name))
         yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
 
     def conclusion(self) -> Iterator[Block]:
-        result, words = self.result, self.words
+        result = self.result
         yield self.section("conclusion")
         if len(result.entrants) == 1:
             yield Block(
@@ -430,7 +432,6 @@ class StudentReport:
             return
         verdicts = result.verdicts()
         yield self.text("verdict_text", level=LEVEL)
-        heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
             [
                 f"${k}$",
@@ -440,7 +441,7 @@ class StudentReport:
             ]
             for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
         ]
-        yield Block("table", words["verdict_table"], heading, rows)
+        yield self.table("verdict_table", ["step", "best", "not_worse", "worst"], rows)
         yield Block("items", lines=list(self.sentences(verdicts)))
 
     def sentences(self, verdicts: list[Verdict]) -> Iterator[str]:
@@ -492,6 +493,9 @@ class StudentReport:
             largest=in_percent(largest),
             control=self.title(result.control),
         )
+
+    def cause(self, reason: Reason) -> str:
+        return cause(reason, self.model, self.words)
 
     def title(self, name: str) -> str:
         return title(name, self.words)
