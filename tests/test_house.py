@@ -210,7 +210,7 @@ ROOMS = {
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
     "kfcourse/pages": 9_560,
-    "kfcourse/records": 5_640,
+    "kfcourse/records": 5_590,
     "kfcourse/scenarios": 10_000,
     "kfcourse/symbolic": 20_980,
     "tests": 184_010,
