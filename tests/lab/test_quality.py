@@ -302,7 +302,6 @@ def test_what_is_generated_is_read_back(generated, tmp_path):
     (read,), (before,) = load_variants(path).values(), generated.variants
     assert (read.name, read.model, read.title) == ("g1", before.model, before.title)
     assert read.model.prior.cov.tolist() == before.model.prior.cov.tolist()
-    assert not examine(read, 512, seed=77).linear and sum(generated.rejected.values()) > 0
 
 
 @pytest.mark.slow
