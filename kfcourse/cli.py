@@ -5,7 +5,6 @@ The instructor's commands are in `kfcourse.exercises.commands`.
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import sys
@@ -22,12 +21,11 @@ from kfcourse.errors import NotFinite
 from kfcourse.exercises.checks.posing import unposed
 from kfcourse.exercises.derivations import check_text
 from kfcourse.exercises.derivations.setting import of_model
-from kfcourse.files import replacing_together, save
+from kfcourse.files import read_text, save
 from kfcourse.lab import admission, grammar, quality
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import (
     LANGUAGES,
-    STANDARD_OUTPUT,
     conclusions,
     recognised_modes,
     remarks_in_words,
@@ -56,7 +54,6 @@ from kfcourse.symbolic.model import Model
 # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
 DERIVATION = 180.0
 INSTRUCTORS = ("exercises", "grade", "solutions")
-LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 RUNS = 20_000  # trajectories
 
 
@@ -73,8 +70,6 @@ SEED = click.option(
 )
 JOBS = click.option(
     "--jobs",
-    "--threads",
-    "jobs",
     type=click.IntRange(min=1),
     default=cores,
     show_default="all",
@@ -91,18 +86,14 @@ def _clear_errors() -> Iterator[None]:
             warnings.simplefilter("ignore", RuntimeWarning)
             warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
             yield
-    except (ValueError, NotFinite) as error:
+    except BrokenPipeError:
+        raise
+    except (ValueError, NotFinite, OSError) as error:
         raise click.ClickException(str(error)) from None
     except MemoryError:
         raise click.ClickException(
             "this needs more memory than there is; take fewer --runs, --steps or --jobs"
         ) from None
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        where = f": {error.filename}" if error.filename else ""
-        remedy = "; make room, and run it again" if error.errno == errno.ENOSPC else ""
-        raise click.ClickException(f"{error.strerror or error}{where}{remedy}") from None
     except KeyboardInterrupt:
         click.echo("Interrupted; files written before are as they were.", err=True)
         sys.exit(130)
@@ -116,12 +107,9 @@ class _Group(click.Group):
         return sorted([*self.commands, *INSTRUCTORS])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        instructors = name in INSTRUCTORS
-        return (
-            getattr(import_module("kfcourse.exercises.commands"), name)
-            if instructors
-            else self.commands.get(name)
-        )
+        if name in INSTRUCTORS:
+            return getattr(import_module("kfcourse.exercises.commands"), name)
+        return self.commands.get(name)
 
     def invoke(self, ctx: click.Context) -> object:
         with _clear_errors():
@@ -172,11 +160,6 @@ def main() -> None:
     help="Bound vector models, too: the exact AOF by particles, which takes minutes for some "
     "thousand trajectories.",
 )
-@click.option(
-    "--same-ensemble",
-    is_flag=True,
-    help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.",
-)
 @JOBS
 @click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
 @click.option("--out", type=PATH, help="Folder of the report.  [default: lab-VARIANT]")
@@ -197,7 +180,7 @@ def main() -> None:
     "--json",
     "json_file",
     type=PATH,
-    help="Also write the numbers to this file; - is standard output.",
+    help="Also write the numbers to this file.",
 )
 def lab(
     variant: str,
@@ -207,7 +190,6 @@ def lab(
     seed: int,
     names: str | None,
     bound: bool,
-    same_ensemble: bool,
     jobs: int,
     dask: str | None,
     out: Path | None,
@@ -222,31 +204,26 @@ def lab(
     """
     chosen = find_variant(variant, variants_file)
     model = chosen.model
-    plain = isinstance(model, Model)
-    entries, usual = (FILTERS, LAB) if plain else (JUMP_FILTERS, JUMP_LAB)
-    if names is None:
-        bound = bound or has_exact(model)
-        wanted = [*usual, *[EXACT] * bound]
-        if not bound:
-            click.echo(
-                "No bound: point masses do not reach this model; --bound runs particles beside "
-                "the others",
-                err=True,
-            )
-    else:
-        wanted = _names(names)
+    entries, usual = (FILTERS, LAB) if isinstance(model, Model) else (JUMP_FILTERS, JUMP_LAB)
+    bound = names is None and (bound or has_exact(model))
+    wanted = [*usual, *[EXACT] * bound] if names is None else _names(names)
+    if names is None and not bound:
+        click.echo(
+            "No bound: point masses do not reach this model; --bound runs particles beside the "
+            "others",
+            err=True,
+        )
     check_names(wanted, entries)
     known = {answer.name: answer for answer in admission.admissions(model, seconds=DERIVATION)}
     answers = [known[name] for name in dict.fromkeys(wanted)]
     refused = {answer.name: answer.reason for answer in answers if answer.built is None}
-    remarks: dict[str, list[str]] = {}
+    notes: dict[tuple[str, str], list[str]] = {}
     for answer in answers:
-        for warning in answer.warnings:
-            click.echo(f"Warning: {title(answer.name)}: {warning}", err=True)
-        for remark in answer.remarks:
-            remarks.setdefault(remark, []).append(title(answer.name))
-    for remark, titles in remarks.items():
-        click.echo(f"{', '.join(titles)}: {remark}", err=True)
+        for note in answer.notes:
+            heading = "Warning: " if answer.poor else ""
+            notes.setdefault((heading, note), []).append(title(answer.name))
+    for (heading, note), titles in notes.items():
+        click.echo(f"{heading}{', '.join(titles)}: {note}", err=True)
     filters = [answer.built for answer in answers if answer.built]
     if not filters:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
@@ -255,27 +232,25 @@ def lab(
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     result = compare(
-        filters, model, runs, steps or chosen.steps, seed, same_ensemble=same_ensemble, jobs=jobs,
+        filters, model, runs, steps or chosen.steps, seed, jobs=jobs,
         dask=dask, scores=judging(model) if scores else None,
     )  # fmt: skip
     result = replace(result, left_out={**refused, **result.left_out})
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
-    to_error = str(json_file) in STANDARD_OUTPUT
-    _tell(result, to_error)
+    click.echo(_ranking(result))
     if json_file:
         write_json(chosen, result, json_file)
-    with _kept(folder) as place:
+    with _writing(folder):
         modes = recognised_modes(result, filters)
-        write_report(chosen, result, place, language, [*known.values()], modes)
+        write_report(chosen, result, folder, language, [*known.values()], modes)
     click.echo(
-        f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""),
-        err=to_error,
+        f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else "")
     )
 
 
-def _tell(result: Comparison, to_error: bool) -> None:
-    """The ranking; to standard error if standard output takes the numbers."""
+def _ranking(result: Comparison) -> str:
+    """The ranking, remarks and conclusions."""
     lines = [
         f"D_k above that of {title(result.reference)}, %, mean over the steps ± standard error:"
     ]
@@ -286,16 +261,15 @@ def _tell(result: Comparison, to_error: bool) -> None:
         lines.append("Predictions of the measurement, mean over the steps and 95 % interval:")
         rows = [["", "log score", f"below {title(result.reference)}", "CRPS"]]
         rows += [[title(name), *score_cells(result, name)] for name in result.names]
-        lines += ["{:<18} {:>19} {:>19} {:>19}".format(*row) for row in rows]
-    click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
+        lines += admission.aligned(rows)
+    return "\n".join([*lines, *remarks_in_words(result), *conclusions(result)])
 
 
 @contextmanager
-def _kept(folder: Path) -> Iterator[Path]:
-    """A place whose files go to the folder; a report that fails changes nothing there."""
+def _writing(folder: Path) -> Iterator[None]:
+    """A report that fails is one sentence: it changed nothing in its folder."""
     try:
-        with replacing_together(folder) as place:
-            yield place
+        yield
     except (OSError, MemoryError):
         raise
     except Exception as error:
@@ -307,13 +281,11 @@ def _kept(folder: Path) -> Iterator[Path]:
 
 
 @main.command()
-@click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
+@click.argument("variant")
 @VARIANTS
-def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
-    """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
-    if len(places) > 2 or (len(places) == 2 and variants_file):
-        raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
-    chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
+def filters(variant: str, variants_file: Path | None) -> None:
+    """Say of each filter whether VARIANT admits it, and why not."""
+    chosen = find_variant(variant, variants_file)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
     click.echo(admission.table(admission.admissions(chosen.model, seconds=DERIVATION)))
 
@@ -391,8 +363,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
         )
     generated = grammar.generate(wanted, seed, runs, jobs, unposed)
     reasons = ", ".join(f"{number} {reason}" for reason, number in generated.rejected.most_common())
-    of = f": {reasons}" if reasons else ""
-    click.echo(f"{generated.rejected.total()} candidates rejected{of}", err=True)
+    click.echo(f"{generated.rejected.total()} candidates rejected: {reasons or 'none'}", err=True)
     if generated.variants:
         text = (
             f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs "
@@ -427,29 +398,14 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
         return find_variant(name, variants_file).plain("derivations")
 
     try:
-        with file.open("rb") as stream:
-            content = stream.read(LONGEST + 1)
-        if len(content) > LONGEST:
+        text = read_text(file)
+        report = check_text(text, model, of_model(model(variant)) if variant else None)
+        if not report.chains:
             raise ValueError(
-                f"{file} has more than {LONGEST:,} bytes: it is no derivation; check the path"
+                f"{file} has no chain of lines, such as F = M[(g*x - h)^2] and, below it, = g^2*d"
             )
-        report = check_text(
-            content.decode("utf-8-sig"), model, of_model(model(variant)) if variant else None
-        )
-    except UnicodeDecodeError:
-        fault = f"{file} is no text in UTF-8: save it as such"
-    except OSError as error:
-        fault = f"{file}: {error.strerror}"
     except ValueError as error:
-        fault = str(error)
-    else:
-        fault = (
-            ""
-            if report.chains
-            else f"{file} has no chain of lines, such as F = M[(g*x - h)^2] and, below it, = g^2*d"
-        )
-    if fault:
-        click.echo(f"Error: {fault}", err=True)
+        click.echo(f"Error: {error}", err=True)
         sys.exit(2)
     click.echo(report)
     sys.exit(2 if report.undecided else 0 if report.right else 1)
@@ -489,11 +445,6 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     "0.999.",
 )
 @click.option(
-    "--by-component",
-    is_flag=True,
-    help="Let the gate judge each component of a row, y1, y2, ..., for itself.",
-)
-@click.option(
     "--unknown",
     default="",
     metavar="NAMES",
@@ -505,9 +456,6 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     metavar="NAMES",
     help="Those of them that are positive, such as variances.",
 )
-@click.option(
-    "--track", metavar="X,Y", help="Two components of the state, drawn against each other."
-)
 @click.option("--out", type=PATH, help="Folder of the report.  [default: estimate-FILE]")
 def estimate(
     file: Path,
@@ -516,10 +464,8 @@ def estimate(
     pairs: tuple[str, ...],
     structure: str,
     gate: float | None,
-    by_component: bool,
     unknown: str,
     positive: str,
-    track: str | None,
     out: Path | None,
 ) -> None:
     """Estimate the states from your own measurements, FILE (CSV): forward, looking back, and
@@ -539,7 +485,6 @@ def estimate(
     """
     variant = model_of(model_file, name)
     folder = out or _below(f"estimate-{file.stem}")
-    drawn = _pair(track, [symbol.name for symbol in variant.model.x]) if track else None
     columns = dict(pair.partition("=")[::2] for pair in pairs)
     if not all(columns.values()):
         raise click.UsageError(
@@ -548,12 +493,12 @@ def estimate(
     _check_places(folder, None)  # before the long part
     click.echo(f"Model {variant.name}: {variant.title or variant.model}", err=True)
     result = estimate_record(
-        file, variant, columns=columns, structure=structure, gate=gate, by_component=by_component,
+        file, variant, columns=columns, structure=structure, gate=gate,
         unknown=_names(unknown), positive=_names(positive),
     )  # fmt: skip
     click.echo("\n".join(result.says()))
-    with _kept(folder) as place:
-        write_record(result, place, drawn)
+    with _writing(folder):
+        write_record(result, folder)
     click.echo(f"Report: {folder / 'report.html'}; numbers: {folder / 'estimate.csv'}")
 
 
@@ -566,16 +511,6 @@ def _below(name: str) -> Path:
     return Path(re.sub(r"[^\w.-]+", "-", name))
 
 
-def _pair(text: str, known: list[str]) -> tuple[str, str]:
-    names = _names(text)
-    if len(names) != 2 or not set(names) <= set(known):
-        raise click.UsageError(
-            f"--track takes two components of the state, separated by a comma; there are "
-            f"{', '.join(known)}"
-        )
-    return names[0], names[1]
-
-
 def _check_places(folder: Path, json_file: Path | None) -> None:
     """ClickException if the report or the numbers cannot be written where they should."""
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
@@ -584,8 +519,7 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
             f"the report cannot go to {folder}: {there} is no folder to write to; choose another "
             f"one with --out"
         )
-    named = str(json_file) not in STANDARD_OUTPUT
-    if json_file and named and (json_file.is_dir() or not json_file.parent.is_dir()):
+    if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
         raise click.ClickException(
             f"the numbers cannot go to {json_file}: name a file in an existing folder with --json"
         )

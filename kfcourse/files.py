@@ -1,4 +1,4 @@
-"""Files that appear complete or not at all, and the package's own fingerprint."""
+"""Texts read, files that appear complete or not at all, and the package's own fingerprint."""
 
 from __future__ import annotations
 
@@ -42,6 +42,20 @@ def replacing_together(folder: Path) -> Iterator[Path]:
     with TemporaryDirectory() as new:
         yield Path(new)
         shutil.copytree(new, folder, dirs_exist_ok=True, copy_function=shutil.copyfile)
+
+
+def read_text(path: Path, refusal: type[ValueError] = ValueError) -> str:
+    """The text of a file; a refusal, which names the file, if there is none or it is not UTF-8."""
+    try:
+        content = path.read_bytes()
+        return content.decode("utf-8-sig")
+    except OSError as error:
+        raise refusal(f"{path} cannot be read: {error.strerror}; check the path") from None
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise refusal(
+            f"{path}, line {line}: a byte that is not UTF-8 (perhaps UTF-16?); save it in UTF-8"
+        ) from None
 
 
 def save(text: str, target: Path) -> None:

@@ -656,7 +656,7 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
         ("why does the EKF diverge", "reference/glossary.html", "term-extended-kalman-filter"),
         ("alpha-beta", "course/radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
         ("likelihood", "beyond/what-the-data-say.html", "likelihood-from-innovations"),
-        ("smoothing_error", "package/kfcourse.records.html", "module-kfcourse.records.smoothing"),
+        ("smooth_iterated", "package/kfcourse.records.html", "module-kfcourse.records.smoothing"),
     ],
 )
 def test_search_finds_sections_and_quotes_them(window, words, page, section):

@@ -117,7 +117,7 @@ def _warn(problem: str) -> None:
 
 def _course(path: Path, variants_file: Path | None) -> list[Student]:
     """The students, each with a variant that there is."""
-    known = [variant.name for variant in chosen_variants([], True, variants_file)]
+    known = [variant.name for variant in chosen_variants([], variants_file)]
     course = read_assignment(path, known)
     for student in course:
         if student.variant not in known:

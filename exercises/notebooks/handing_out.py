@@ -40,7 +40,7 @@ def hand_out(
     if everything:
         variants, faults = usable_variants(variants_file)
     else:
-        chosen = chosen_variants(names, bool(students and not names), variants_file)
+        chosen = chosen_variants(names, variants_file)
         variants = {variant.name: variant for variant in chosen}
     for variant in variants.values():
         variant.plain("the exercises")  # told once, not for each set

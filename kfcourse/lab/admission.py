@@ -30,7 +30,7 @@ from kfcourse.lab.short_names import (
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
+from kfcourse.symbolic.quadrature import QuadratureWarning, unscented
 from kfcourse.symbolic.reading import ModelError
 
 BLIND = 0.5  # of the unexplained variance, that must be seen
@@ -53,27 +53,26 @@ class Admission:
         None if it cannot be built.
     reason : str or Exception
         Why not; empty if it can.
-    warnings : tuple of str
-        Why it will not do well.
-    remarks : tuple of str
-        Worth knowing.
+    poor : bool
+        Whether it can be built, but will not do well.
+    notes : tuple of str
+        Why it will not; else what is worth knowing of it.
     """
 
     name: str
     built: Filter | Design | None
     reason: Reason = ""
-    warnings: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
+    poor: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
-        """Whether it may be used: "yes", "no", or "poor" if it can be built, but there are
-        warnings."""
-        return "no" if self.built is None else "poor" if self.warnings else "yes"
+        """Whether it may be used: "yes", "no" or "poor"."""
+        return "no" if self.built is None else "poor" if self.poor else "yes"
 
     @property
     def says(self) -> str:
-        return "; ".join([str(self.reason)] if self.reason else [*self.warnings, *self.remarks])
+        return str(self.reason) if self.reason else "; ".join(self.notes)
 
 
 def admissions(
@@ -117,13 +116,10 @@ def _admitted(name: str, entry: Entry, structures: Structures) -> Admission:
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, error.with_traceback(None))
         faults = [str(warning.message) for warning in caught]
-        if not structures.jumps:
-            faults += {"linearised": _flat, "unscented": _blind}.get(
-                entry.functions, lambda _: iter(())
-            )(structures)
-        return Admission(
-            name, built, "", tuple(faults), () if faults else tuple(_remarks(entry, structures))
-        )
+        if not structures.jumps and entry.functions in LOOKS:
+            faults += LOOKS[entry.functions](structures)
+        notes = faults or _remarks(entry, structures)
+        return Admission(name, built, poor=bool(faults), notes=tuple(notes))
 
 
 def _remarks(entry: Entry, structures: Structures) -> Iterator[str]:
@@ -154,24 +150,16 @@ def _flat(structures: Structures) -> Iterator[str]:
 
 def _blind(structures: Structures) -> Iterator[str]:
     """Points on the axes, which see no product of state and noise, nor of two components."""
-    model = structures.model
+    model, law = structures.model, structures.model.prior
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", QuadratureWarning)
         try:
-            full = structures.gaussian
+            points, full = unscented(model).at(0), structures.normal.at(0)
         except NoClosedForm:
-            try:
-                full = gauss_hermite(model, 7)
-            except ModelError:
-                return
-        points, full = unscented(model).at(0), full.at(0)
-    law = model.prior
+            return
+    unexplained = "the measurement that the state does not explain"
     for what, part, whole in (
-        (
-            "the measurement that the state does not explain",
-            points.measure(*law).R,
-            full.measure(*law).R,
-        ),
+        (unexplained, points.measure(*law).R, full.measure(*law).R),
         ("the next state", points.predict(*law).cov, full.predict(*law).cov),
     ):
         share = np.diagonal(np.broadcast_to(part, whole.shape)) / np.diagonal(whole)
@@ -181,6 +169,10 @@ def _blind(structures: Structures) -> Iterator[str]:
                 f"variance of {what} at the prior law: products such as x**2*w are 0 on them; "
                 "aof-gauss-hermite sees them"
             )
+
+
+# Of filters with these structural functions: what they may not see.
+LOOKS = {"linearised": _flat, "unscented": _blind}
 
 
 def table(answers: Sequence[Admission]) -> str:

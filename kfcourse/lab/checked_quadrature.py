@@ -4,8 +4,7 @@ checked.
 A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points
 it takes depends on how wide the laws are that occur.  So the AOF runs over a pilot's trajectories
 with some order and with twice that order; the order is raised until both estimate the same.  A
-model with modes has one order for all modes without formulas, each checked on trajectories of its
-own.
+model with modes has one order for all modes, each checked on trajectories of its own.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import QuadratureWarning, apart, axes, gauss_hermite
-from kfcourse.symbolic.structure import Structure, gaussian
+from kfcourse.symbolic.structure import Structure
 
 ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
 # Estimates may change by this part of their deviation when the order is doubled, variances by this
@@ -37,8 +36,7 @@ MOST = 1500  # points together of the rule that checks: with more, a pilot takes
 
 
 class Checked(NamedTuple):
-    """Structures by quadrature, a structure for each mode; where a mode has formulas they are
-    these.
+    """Structures by quadrature, a structure for each mode.
 
     They are named "gaussian", as what they compute is; `order` is their number of points an axis,
     `apart` the largest difference that the pilot found, in the measure of `CLOSE`.
@@ -66,15 +64,14 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
     NoClosedForm
         No order does; the message tells how far the highest order tried is from twice that order.
     """
-    formulas = [(mode, _formulas(mode)) for mode in modes_of(model)]
-    size = max(axes(mode) for mode, structure in formulas if structure is None)
+    modes = modes_of(model)
+    size = max(map(axes, modes))
     problem = f"; Gauss-Hermite quadrature on {size} axes takes too long"
     for order in (order for order in ORDERS if (2 * order) ** size <= MOST):
         try:
-            tried = [(known, 0.0) if known else _tried(mode, order) for mode, known in formulas]
+            structures, errors = zip(*(_tried(mode, order) for mode in modes), strict=True)
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
             continue
-        structures, errors = zip(*tried, strict=True)
         apart = float(np.max(errors))
         if apart <= CLOSE:
             return Checked([*structures], order, apart)
@@ -93,13 +90,6 @@ def _tried(model: Model, order: int) -> tuple[Structure, float]:
         warnings.simplefilter("ignore", QuadratureWarning)
         coarse = replace(gauss_hermite(model, order), name="gaussian")
         return coarse, _apart(coarse, gauss_hermite(model, 2 * order))
-
-
-def _formulas(model: Model) -> Structure | None:
-    try:
-        return gaussian(model)
-    except NoClosedForm:
-        return None
 
 
 def _apart(coarse: Structure, fine: Structure) -> float:

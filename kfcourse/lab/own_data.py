@@ -11,7 +11,7 @@ import csv
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ from kfcourse.filters.base import Filter
 from kfcourse.filters.gate import gated
 from kfcourse.lab.report import save_figure, save_texts
 from kfcourse.lab.report_text import lines_of, ranges
-from kfcourse.lab.variants import MANY, Variant, VariantError, chosen_variants, find_variant
+from kfcourse.lab.variants import MANY, Variant, VariantError, find_variant, read_tables
 from kfcourse.laws import Array
 from kfcourse.linear.consistency import Innovations, autocorrelation
 from kfcourse.records.estimation import Likeliest, estimate
@@ -116,16 +116,13 @@ def judged(finding: Finding) -> str:
 
 def model_of(path: Path, name: str | None) -> Variant:
     """The model of a file of variants: the one named, or the only one."""
-    if name is not None:
-        return find_variant(name, path)
-    variants = chosen_variants([], False, path)
-    if len(variants) > 1:
-        names = [variant.name for variant in variants]
+    names = [*read_tables(path)] if name is None else [name]
+    if len(names) > 1:
         raise VariantError(
-            f"{path} has {len(variants)} models; say which: --variant "
+            f"{path} has {len(names)} models; say which: --variant "
             f"{' or --variant '.join(names[:4])}"
         )
-    return variants[0]
+    return find_variant(names[0], path)
 
 
 def estimate_record(
@@ -135,7 +132,6 @@ def estimate_record(
     columns: Mapping[str, str] | None = None,
     structure: str = "linearised",
     gate: float | None = None,
-    by_component: bool = False,
     unknown: Sequence[str] = (),
     positive: Sequence[str] = (),
 ) -> Analysis:
@@ -150,8 +146,6 @@ def estimate_record(
         A key of `STRUCTURES`.
     gate : float, optional
         Probability with which a measurement passes (`kfcourse.filters.gated`).
-    by_component : bool
-        Whether the gate judges each component of a measurement for itself.
     unknown, positive : sequence of str
         As of `kfcourse.records.estimate`.
 
@@ -165,7 +159,7 @@ def estimate_record(
 
     def build(model: Model) -> Filter:
         plain = aof(STRUCTURES[structure](model))
-        return plain if gate is None else gated(plain, gate, by_component=by_component)
+        return plain if gate is None else gated(plain, gate)
 
     build(record.model)  # what cannot be had is said before the long part
     try:
@@ -173,7 +167,6 @@ def estimate_record(
         if likeliest:
             record = record._replace(model=likeliest.model)
         examined = examine(build(record.model), record.y)
-        result = Analysis(variant, record, structure, gate, likeliest, examined)
     except NoDensity as error:
         raise RecordError(
             f"{path}: row {error.step + 1}, time {record.times[error.step]:.16g}, cannot be "
@@ -182,17 +175,7 @@ def estimate_record(
             "to it (--gate refuses those out "
             "of all bounds) and at the formulas, and give every component of the meter a noise"
         ) from None
-    for law in (examined.estimate, examined.smoothed):
-        finite = np.isfinite(law.mean).all(axis=(1, 2)) & np.isfinite(law.cov).all(axis=(1, 2, 3))
-        if not finite.all():
-            k = int(np.argmin(finite))
-            raise RecordError(
-                f"{path}: the estimate is not finite from row {k + 1}, time "
-                f"{record.times[k]:.16g}: look at the formulas there "
-                "(an interval of 0, a root of what is negative), or begin with a smaller prior "
-                "variance"
-            )
-    return result
+    return Analysis(variant, record, structure, gate, likeliest, examined)
 
 
 def columns_of(result: Analysis) -> dict[str, Array]:
@@ -210,13 +193,10 @@ def columns_of(result: Analysis) -> dict[str, Array]:
     return columns | {"weight": weight, "log_likelihood": likelihood}
 
 
-def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None = None) -> None:
+def write_record(result: Analysis, folder: Path) -> None:
     """Write estimate.csv, report.html and the figures, all of them or none."""
     model, times, columns = result.record.model, result.record.times, columns_of(result)
     pictures: dict[str, tuple[str, Callable[[Axes], None]]] = {}
-    if track:
-        about = f"The track: {track[1]} against {track[0]}."
-        pictures["track"] = about, partial(_track, columns, track)
     for name in [symbol.name for symbol in model.x]:
         about = (
             f"{name}: the estimate with a band of two standard deviations, and smoothed, given the "
@@ -259,34 +239,23 @@ def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None =
 def _labelled(ax: Axes, across: str, up: str) -> None:
     ax.set(xlabel=across, ylabel=up)
     ax.grid(True, alpha=0.3)
+    if max(np.size(line.get_xdata()) for line in ax.lines) > PICTURE:
+        ax.set_rasterization_zorder(3)  # all but the legend
     if ax.get_legend_handles_labels()[1]:
         ax.legend(fontsize="small")
 
 
-def _curve(ax: Axes, x: Array, y: Array, style: str = "-", half: Any = None, **of: Any) -> None:
-    """A curve, and a band of so much to both sides; of a long record as a picture."""
-    of["rasterized"] = len(x) > PICTURE
-    ax.plot(x, y, style, linewidth=1, markersize=4, **of)
-    if half is not None:
-        band = {"color": of["color"], "rasterized": of["rasterized"]}
-        ax.fill_between(x, y - half, y + half, alpha=0.2, linewidth=0, **band)
+def _band(ax: Axes, x: Array, y: Array, half: Array, colour: str) -> None:
+    """What is within so much of a curve."""
+    ax.fill_between(x, y - half, y + half, alpha=0.2, linewidth=0, color=colour)
 
 
 def _component(times: Array, columns: Mapping[str, Array], name: str, ax: Axes) -> None:
     """A component of the state with its band, and smoothed."""
     for label, (key, colour) in CURVES.items():
-        half = 2 * columns[f"{name}{key}_sd"]
-        _curve(ax, times, columns[name + key], "-", half, color=colour, label=label)
+        ax.plot(times, columns[name + key], linewidth=1, color=colour, label=label)
+        _band(ax, times, columns[name + key], 2 * columns[f"{name}{key}_sd"], colour)
     _labelled(ax, "time", name)
-
-
-def _track(columns: Mapping[str, Array], names: tuple[str, str], ax: Axes) -> None:
-    """Two components against each other."""
-    for label, (key, colour) in CURVES.items():
-        x, y = (columns[name + key] for name in names)
-        _curve(ax, x, y, color=colour, label=label)
-    ax.set_aspect("equal", adjustable="datalim")
-    _labelled(ax, *names)
 
 
 def _innovations(
@@ -296,11 +265,11 @@ def _innovations(
     value, two = columns[f"{name}_innovation"], 2 * columns[f"{name}_innovation_sd"]
     measured = ~np.isnan(value)
     refused = measured & ~passed
-    zero = np.zeros(measured.sum())
-    _curve(ax, times[measured], zero, "", two[measured], color=ESTIMATE)
-    _curve(ax, times[~refused], value[~refused], ".", color=MEASURED)
+    _band(ax, times[measured], np.zeros(measured.sum()), two[measured], ESTIMATE)
+    ax.axhline(0, color="black", linewidth=0.8)
+    ax.plot(times[~refused], value[~refused], ".", markersize=4, color=MEASURED)
     if refused.any():
-        _curve(ax, times[refused], value[refused], "x", color=REFUSED, label="refused")
+        ax.plot(times[refused], value[refused], "x", markersize=4, color=REFUSED, label="refused")
         ax.set_yscale("symlog", linthresh=float(np.nanmax(two)))
     _labelled(ax, "time", f"innovation of {name}")
 
@@ -314,7 +283,7 @@ def _whiteness(columns: Mapping[str, Array], name: str, passed: Array, ax: Axes)
         of_size_1 = Innovations(s, np.mean(s**2) * np.ones((len(s), 1, 1, 1)))
         white = autocorrelation(of_size_1, min(LAGS, len(s) - 1))
         lags, bound = np.arange(1, len(white.value) + 1), normal_bound() * white.standard_deviation
-        _curve(ax, lags, 0 * bound, "", bound, color=ESTIMATE)
-        _curve(ax, lags, white.value, "o-", color=MEASURED)
+        _band(ax, lags, 0 * bound, bound, ESTIMATE)
+        ax.plot(lags, white.value, "o-", linewidth=1, markersize=4, color=MEASURED)
     ax.axhline(0, color="black", linewidth=0.8)
     _labelled(ax, "measurements between them", "correlation")

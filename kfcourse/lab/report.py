@@ -41,7 +41,6 @@ from kfcourse.symbolic.markup import mathml
 
 LANGUAGES = tuple(WORDS)
 RECOGNISED = 1600  # trajectories on which modes are told
-STANDARD_OUTPUT = ("-", "/dev/stdout")
 # the line's own &
 ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -60,8 +59,7 @@ def write_report(
     `known` are the filters that the model may admit, of which the report has a table; `modes` are
     the `recognised_modes`.
     """
-    report = _report(result, language, known)
-    report.recognised = modes
+    report = _report(result, language, known, modes)
     content = {
         "blocks": list(report.blocks()),
         "words": report.words,
@@ -79,10 +77,13 @@ def write_report(
 
 
 def _report(
-    result: Comparison, language: str = "en", known: Sequence[Admission] = ()
+    result: Comparison,
+    language: str = "en",
+    known: Sequence[Admission] = (),
+    modes: Recognised | None = None,
 ) -> StudentReport:
     jumps = isinstance(result.model, JumpModel)
-    return (JumpReport if jumps else StudentReport)(result, WORDS[language], known)
+    return (JumpReport if jumps else StudentReport)(result, WORDS[language], known, modes)
 
 
 def remarks_in_words(result: Comparison) -> list[str]:
@@ -156,10 +157,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         data["mean_above_bound"] = {name: _number(result.mean_gap(name)) for name in ranking}
     # infinite and undefined numbers as null: JSON has none
     text = json.dumps(json.loads(json.dumps(data), parse_constant=lambda _: None), indent=1)
-    if str(path) in STANDARD_OUTPUT:
-        print(text, flush=True)
-    else:
-        save(text, path)
+    save(text, path)
     return path
 
 
@@ -193,14 +191,8 @@ def conclusions(result: Comparison) -> list[str]:
 
 
 def _three_digits(value: float) -> str:
-    """Three digits, or all before the point; a power of ten only for what is beyond all measure."""
-    if abs(value) >= 1e12:
-        return f"{value:.3g}"
-    return (
-        f"{value:.0f}"
-        if abs(value) >= 1000
-        else np.format_float_positional(value, 3, fractional=False, trim="-")
-    )
+    """Three digits, and no power of ten."""
+    return np.format_float_positional(value, 3, fractional=False, trim="-")
 
 
 def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> Recognised | None:

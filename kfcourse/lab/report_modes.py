@@ -23,7 +23,7 @@ class JumpReport(StudentReport):
         words, size = self.words, len(self.modes)
         mean, cov = self.model.prior
         yield self.section("filters")
-        yield self.text("start_modes")
+        yield self.text("start")
         start = [
             rf"\lambda_0^j &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0^j = D_0 = "
             rf"{matrix(cov)},\qquad c_0^j = q_j"

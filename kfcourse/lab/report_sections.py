@@ -4,6 +4,7 @@ comparison and conclusion; of models with modes see `report_modes`."""
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.errors import Reason
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.exact.laws import modes_of
@@ -43,6 +45,7 @@ from kfcourse.symbolic.writing import formula_latex, number_latex
 
 LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
+SHOWN = (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000)  # steps in tables
 
 # Numbers in the school's catalogue of structural functions, for the forms whose numbers the course
 # gives.
@@ -76,19 +79,21 @@ class StudentReport:
     """The blocks of the report, section by section."""
 
     def __init__(
-        self, result: Comparison, words: dict[str, str], known: Sequence[Admission] = ()
+        self,
+        result: Comparison,
+        words: dict[str, str],
+        known: Sequence[Admission] = (),
+        recognised: Recognised | None = None,
     ) -> None:
-        self.result, self.words, self.known = result, words, known
+        self.result, self.words, self.known, self.recognised = result, words, known, recognised
         self.model: Any = result.model
         self.structures = Structures.of(self.model)
         self.modes, self.jumps = modes_of(self.model), self.structures.jumps
-        self.recognised: Recognised | None = None
-        # of an object that moves in continuous time: some words are others
-        self.moves = self.modes[0].between
-        self.kind, self.numbers = "", {}
+        # of an object that moves in continuous time, and of one with modes, some words are others
+        self.moves, self.numbers = self.modes[0].between, {}
+        self.kind = "_modes" if self.jumps else "_between" if self.moves is not None else ""
         if self.moves is not None:
             accuracy = number_latex(self.moves.accuracy)
-            self.kind = "_between"
             self.numbers = {"substeps": self.moves.substeps, "accuracy": accuracy}
         self.scalar = self.model.n == self.model.p == 1
         used = {entry(name).functions for name in result.names}
@@ -119,6 +124,13 @@ class StudentReport:
     def text(self, key: str, **values: object) -> Block:
         return Block("text", self.phrase(key, **values))
 
+    def table(
+        self, key: str, heading: Iterable[str], rows: list[list[str]], **values: object
+    ) -> Block:
+        """A table below these words; what its columns are called, in words where there are some."""
+        columns = [self.words.get(cell, cell) for cell in heading]
+        return Block("table", self.phrase(key, **values), columns, rows)
+
     def translated(self, text: str) -> str:
         for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
             text = text.replace(english, rf"\text{{{self.words[key]}}}")
@@ -132,45 +144,46 @@ class StudentReport:
         yield from self.conclusion()
         if self.known:
             yield self.section("admitted")
-            words, why = self.words, partial(cause, model=self.model, words=self.words)
-            heading = [words["filter"], words["admitted_verdict"], words["admitted_why"]]
             rows = [
                 [
                     self.title(answer.name),
-                    words[f"admitted_{answer.verdict}"],
-                    why(answer.reason) if answer.reason else answer.says,
+                    self.words[f"admitted_{answer.verdict}"],
+                    self.cause(answer.reason) if answer.reason else answer.says,
                 ]
                 for answer in self.known
             ]
-            yield Block("table", words["admitted_text"], heading, rows)
+            yield self.table("admitted_text", ["filter", "admitted_verdict", "admitted_why"], rows)
 
     def task(self) -> Iterator[Block]:
-        model, moves, words = self.model, self.moves, self.words
+        model, moves = self.model, self.moves
         yield self.section("task")
-        yield self.text("task_modes_text" if self.jumps else "task_text", modes=len(self.modes))
+        yield self.text("task_text", modes=len(self.modes))
         yield from self.in_modes(self.equations)
         if moves is not None and any(moves.correction):
             yield self.text("stratonovich")
             added = enumerate(moves.correction, 1)
             yield formulas([rf"\Delta a_{i} &= {formula_latex(of, model.x)}" for i, of in added])
         names = dict.fromkeys(name for mode in self.modes for name in mode.values)
-        common = [
-            name for name in names if len({mode.values.get(name) for mode in self.modes}) == 1
-        ]
-        values = ", ".join(
-            f"${sp.latex(name)} = {number_latex(float(self.modes[0].values[name]))}$"
-            for name in common
-        )
-        if values:
-            yield self.text("common_parameters" if self.jumps else "parameters", values=values)
-        if self.jumps:
-            own = [name for name in names if name not in common]
-            heading = ["$j$", words["mode"], *(f"${sp.latex(name)}$" for name in own)]
-            rows = [
-                [f"${j}$", name, *(_value(mode, key) for key in own)]
-                for j, (name, mode) in enumerate(zip(model.names, self.modes, strict=True), 1)
+        # of each mode; "-" where it has no such parameter
+        values = {
+            sp.latex(name): [
+                number_latex(float(mode.values[name])) if name in mode.values else "-"
+                for mode in self.modes
             ]
-            yield Block("table", words["modes_table"], heading, rows)
+            for name in names
+        }
+        common = {name: texts[0] for name, texts in values.items() if len({*texts}) == 1}
+        own = {name: texts for name, texts in values.items() if name not in common}
+        if common:
+            listed = ", ".join(f"${name} = {text}$" for name, text in common.items())
+            yield self.text("parameters", values=listed)
+        if self.jumps:
+            heading = ["$j$", "mode", *(f"${name}$" for name in own)]
+            rows = [
+                [f"${j + 1}$", name, *(f"${texts[j]}$" for texts in own.values())]
+                for j, name in enumerate(model.names)
+            ]
+            yield self.table("modes_table", heading, rows)
         yield self.text("laws")
         laws = [rf"x_0 &\sim {law(model.prior)}"]
         for symbol, noise in (("v_k", "state_noise"), ("w_k", "meter_noise"))[moves is not None :]:
@@ -189,7 +202,7 @@ class StudentReport:
             yield formulas([chain, rf"q &= {matrix(model.first[None])}"])
         yield self.text("independent")
         titles = ", ".join(map(self.title, self.result.entrants))
-        yield self.text("find_modes" if self.jumps else "find", filters=titles)
+        yield self.text("find", filters=titles)
 
     def in_modes(
         self, make: Callable[[Model], Iterable[Block]], every: str = ""
@@ -362,8 +375,8 @@ class StudentReport:
                 [f"${k}$", *(power_of_ten(estimate[k]) for estimate in estimates)]
                 for k in table_steps(result)
             ]
-            caption = words["table_goes_on" if start else "table"]
-            yield Block("table", caption, ["$k$", *map(self.title, names)], rows)
+            key = "table_goes_on" if start else "table"
+            yield self.table(key, ["step", *map(self.title, names)], rows)
         for text in self.remarks():
             yield Block("text", text)
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
@@ -376,18 +389,16 @@ class StudentReport:
                 [self.title(name), words["diverges"] if name in result.lost else in_percent(gap)]
                 for name, gap in result.ranking()
             ]
-            caption = self.phrase("ranking_table", reference=reference)
-            yield Block("table", caption, [words["filter"], "%"], rows)
+            yield self.table("ranking_table", ["filter", "%"], rows, reference=reference)
         if result.scored:
             below = self.phrase("score_below", name=self.title(result.reference))
-            heading = [words["filter"], words["log_score"], below, "CRPS"]
             rows = [[self.title(name), *score_cells(result, name)] for name in result.names]
-            yield Block("table", self.phrase("scores_table", level=LEVEL), heading, rows)
+            heading = ["filter", "log_score", below, "CRPS"]
+            yield self.table("scores_table", heading, rows, level=LEVEL)
         if modes := self.recognised:
             rows = [[self.title(name), in_percent(share)] for name, share in modes.share.items()]
             guess = [words["guess"], f"${100 * modes.guess:.1f}$"]
-            heading = [words["filter"], words["share"]]
-            yield Block("table", words["share_table"], heading, [*rows, guess])
+            yield self.table("share_table", ["filter", "share"], [*rows, guess])
             yield Block("figure", words["figure_modes"], ["modes"])
 
     def remarks(self) -> Iterator[str]:
@@ -408,13 +419,11 @@ class StudentReport:
         """The filters that do not take part, and why, those with the same reason together."""
         names: dict[str, list[str]] = {}
         for name, reason in self.result.left_out.items():
-            names.setdefault(cause(reason, self.result.model, self.words), []).append(
-                self.title(name)
-            )
+            names.setdefault(self.cause(reason), []).append(self.title(name))
         yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
 
     def conclusion(self) -> Iterator[Block]:
-        result, words = self.result, self.words
+        result = self.result
         yield self.section("conclusion")
         if len(result.entrants) == 1:
             yield Block(
@@ -423,7 +432,6 @@ class StudentReport:
             return
         verdicts = result.verdicts()
         yield self.text("verdict_text", level=LEVEL)
-        heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
             [
                 f"${k}$",
@@ -433,31 +441,28 @@ class StudentReport:
             ]
             for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
         ]
-        yield Block("table", words["verdict_table"], heading, rows)
+        yield self.table("verdict_table", ["step", "best", "not_worse", "worst"], rows)
         yield Block("items", lines=list(self.sentences(verdicts)))
 
     def sentences(self, verdicts: list[Verdict]) -> Iterator[str]:
         """The conclusion: who leads and who is last, on how many steps, and how far from the
         bound."""
         result, words = self.result, self.words
-        alone = [best for best, others, _ in verdicts if not others]
-        for name in sorted(set(alone), key=lambda name: -alone.count(name)):
-            steps = [
-                k for k, (best, others, _) in enumerate(verdicts) if best == name and not others
-            ]
+        alone: dict[str, list[int]] = {}
+        for k, (best, others, _) in enumerate(verdicts):
+            if not others:
+                alone.setdefault(best, []).append(k)
+        for name, steps in sorted(alone.items(), key=lambda item: -len(item[1])):
             yield self.phrase("leads", name=self.title(name), at=self.at(steps))
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
         if alone and unsure:  # without a leader it is every step, as has been said
             yield self.phrase("together", at=self.at(unsure))
-        last = [worst for _, _, worst in verdicts if worst]
-        if last:
-            name = max(set(last), key=lambda name: (last.count(name), name))
-            yield self.phrase(
-                "last", name=self.title(name), steps=last.count(name), all=result.steps
-            )
-        else:
+        last = Counter(worst for _, _, worst in verdicts if worst).most_common(1)
+        for name, count in last:
+            yield self.phrase("last", name=self.title(name), steps=count, all=result.steps)
+        if not last:
             yield words["nobody_last"]
         # the control, or its equal
         leads = not result.has_bound and abs(float(result.ranking()[0][1].value)) < ALIKE
@@ -489,13 +494,11 @@ class StudentReport:
             control=self.title(result.control),
         )
 
+    def cause(self, reason: Reason) -> str:
+        return cause(reason, self.model, self.words)
+
     def title(self, name: str) -> str:
         return title(name, self.words)
-
-
-def _value(mode: Model, name: sp.Symbol) -> str:
-    """A parameter's value in a mode, if it is one there."""
-    return f"${number_latex(float(mode.values[name]))}$" if name in mode.values else "–"
 
 
 def score_cells(result: Comparison, name: str) -> list[str]:
@@ -513,9 +516,4 @@ def score_cells(result: Comparison, name: str) -> list[str]:
 
 def table_steps(result: Comparison) -> list[int]:
     """The first steps and then some, to the last."""
-    steps = [
-        k
-        for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000)
-        if k < result.steps
-    ]
-    return steps if steps[-1] == result.steps - 1 else [*steps, result.steps - 1]
+    return [k for k in SHOWN if k < result.steps - 1] + [result.steps - 1]

@@ -13,6 +13,7 @@ from typing import Any
 
 from kfcourse.continuous.sampling import sampled
 from kfcourse.errors import expect_sizes
+from kfcourse.files import read_text
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model, nothing_random
 from kfcourse.symbolic.reading import shown
@@ -112,15 +113,13 @@ def usable_variants(
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
     """One variant by name; VariantError lists the names if there is no such."""
-    return chosen_variants([name], False, path)[0]
+    return chosen_variants([name], path)[0]
 
 
-def chosen_variants(
-    names: Sequence[str], everything: bool, path: str | Path | None = None
-) -> list[Variant]:
+def chosen_variants(names: Sequence[str], path: str | Path | None = None) -> list[Variant]:
     """The variants of these names, each once, or all of `load_variants`; VariantError for
     others."""
-    if everything:
+    if not names:
         return list(load_variants(path).values())
     variants, faults = read_variants(path, names)
     for fault in faults.values():
@@ -171,12 +170,9 @@ def _shipped(file: str) -> dict[str, Any]:
 
 def _tables(path: Path) -> dict[str, Any]:
     """The tables of a file of one's own."""
-    if not path.is_file():
-        raise VariantError(f"no file of variants at {path}; check the path")
+    text = read_text(path, VariantError)
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("variants")
-    except (OSError, UnicodeDecodeError) as error:
-        raise VariantError(f"{path} cannot be read: {error}") from None
+        tables = tomllib.loads(text).get("variants")
     except (ValueError, RecursionError) as error:
         raise VariantError(
             f"{path} is not valid TOML: {error}; formulas and other texts stand in quotes, and a "
@@ -234,30 +230,21 @@ def on_a_line(text: str) -> str:
 def summary(name: str, table: Mapping[str, Any]) -> str:
     """Name, title and equations as the table has them; a line for each mode, of what differs
     there."""
-    modes: Mapping[str, Mapping[str, Any]] = table.get("modes", {})
-    common = table.get("parameters", {})
-    numbers = [{**common, **mode.get("parameters", {})} for mode in modes.values()]
-    formulas = [_equations({**table, **mode}) for mode in modes.values()] or [_equations(table)]
-    same = len(set(formulas)) == 1
     lines = [f"{name:>6}  {on_a_line(str(table.get('title', ''))) or 'no title'}"]
-    lines += formulas[:same]
-    for mode, formula, values in zip(modes, formulas, numbers, strict=bool(modes)):
-        own = [
-            f"{key} = {value:g}"
-            for key, value in values.items()
-            if any(of.get(key) != value for of in numbers)
-        ]
-        lines.append(f"{mode}: {';  '.join(own if same else [formula, *own])}")
+    lines += [_equations(table)]
+    for mode, own in table.get("modes", {}).items():
+        values = {key: f"{value:g}" for key, value in own.get("parameters", {}).items()}
+        formulas = {key: value for key, value in own.items() if key != "parameters"}
+        parts = [f"{key} = {on_a_line(str(value))}" for key, value in (formulas | values).items()]
+        lines.append(f"{mode}: {';  '.join(parts) or 'as above'}")
     return "\n        ".join(lines)
 
 
 def _equations(table: Mapping[str, Any]) -> str:
     left, key = ("dx/dt", "drift") if "drift" in table else ("x'", "state")
     state, meter = (
-        [side] if isinstance(side, str) else side for side in (table[key], table["meter"])
+        ", ".join(map(on_a_line, [side] if isinstance(side, str) else side))
+        for side in (table[key], table["meter"])
     )
     pushed = f" + ({on_a_line(str(table['diffusion']))}) v" if key == "drift" else ""
-    return (
-        f"{left} = {', '.join(map(on_a_line, state))}{pushed};  y = "
-        f"{', '.join(map(on_a_line, meter))}"
-    )
+    return f"{left} = {state}{pushed};  y = {meter}"

@@ -2,7 +2,7 @@
 and what in it is doubtful.
 
 smoothing    `smooth`: the states given all measurements, or some steps ahead; `smooth_iterated`:
-             linearised there again; `smoothing_error`: how good they are, where that is known
+             linearised there again
 evidence     `likelihood`: of each measurement, given all before it
 estimation   `estimate`: parameters and noise variances of the largest likelihood, and what the
              record does not tell; `profile`
@@ -16,7 +16,7 @@ from kfcourse.records.estimation import estimate, profile
 from kfcourse.records.evidence import likelihood
 from kfcourse.records.examination import examine, findings, weights
 from kfcourse.records.reading import read_measurements
-from kfcourse.records.smoothing import smooth, smooth_iterated, smoothing_error
+from kfcourse.records.smoothing import smooth, smooth_iterated
 
 __all__ = [
     "estimate",
@@ -27,6 +27,5 @@ __all__ = [
     "read_measurements",
     "smooth",
     "smooth_iterated",
-    "smoothing_error",
     "weights",
 ]

@@ -40,23 +40,6 @@ DIRECTION = 0.01  # of a direction of length 1: components below are rounding of
 TOGETHER = 1e-5
 
 
-class NoMaximum(ValueError):
-    """The search found none; `model` is where it ended.
-
-    The likelihood of a gated filter jumps where a measurement begins to pass, and a maximum beside
-    a jump has no derivatives.
-    """
-
-    def __init__(self, reason: str, model: Model, names: Sequence[str]) -> None:
-        at = ", ".join(f"{name} = {float(model.parameters[name]):.6g}" for name in names)
-        super().__init__(
-            f"no maximum of the likelihood was found ({reason}; last at {at}): begin nearer to "
-            f"it, fix a parameter, or leave out "
-            "the measurements that a gate refuses, in the place of the gate"
-        )
-        self.model = model
-
-
 class Likeliest(NamedTuple):
     """Parameters of the largest likelihood.
 
@@ -118,7 +101,7 @@ def estimate(
     ModelError
         Names that are no parameters, or a start that is not positive.
     ValueError
-        No likelihood at the start, as of `likelihood`, or no maximum found (`NoMaximum`).
+        No likelihood at the start, as of `likelihood`, or no maximum found.
 
     Examples
     --------
@@ -161,7 +144,13 @@ def estimate(
         and np.isfinite(information).all()
         and np.linalg.eigvalsh(information).min() > -FLAT
     ):
-        raise NoMaximum(result.message, best, names)
+        at = ", ".join(f"{name} = {float(best.parameters[name]):.6g}" for name in names)
+        # a gate's likelihood jumps where a measurement begins to pass
+        raise ValueError(
+            f"no maximum of the likelihood was found ({result.message}; last at {at}): begin "
+            "nearer to it, fix a parameter, or leave out the measurements that a gate refuses, "
+            "in the place of the gate"
+        )
     noise = 10 * np.finfo(float).eps * abs(result.fun) / STEP**2
     variance, flat = _inverse(information, unit, names, noise)
     error = np.sqrt(variance) * np.where(logs, parameters(t), 1.0)
@@ -200,8 +189,7 @@ def _checked(
     model: Model, unknown: Sequence[str], positive: Sequence[str]
 ) -> tuple[tuple[str, ...], Array, Array]:
     """Names, whether each is positive, and values at the start."""
-    names = (unknown,) if isinstance(unknown, str) else tuple(unknown)
-    positive = (positive,) if isinstance(positive, str) else tuple(positive)
+    names = tuple(unknown)
     if not names or len(set(names)) < len(names) or not set(names) <= set(model.parameters):
         raise ModelError(
             f"unknown must name parameters of the model, each once: it has "

@@ -17,9 +17,8 @@ measurements held back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from itertools import islice
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -34,7 +33,7 @@ from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import measurements, walk
 from kfcourse.records.evidence import log_densities
 
-T = TypeVar("T")
+BAR: Any = {"unit": "row", "disable": None, "delay": 2}  # of a long record, on a terminal
 TAILS = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
 
 
@@ -103,7 +102,7 @@ def examine(filter_: Filter, y: Array) -> Examination:
     """
     expect(filter_, Filter, "examine")
     structure, y = structure_of(filter_, "an examination of a record"), measurements(filter_, y)
-    visited = list(shown_progress(walk(filter_, y), "filter", len(y) + 1))
+    visited = list(tqdm(walk(filter_, y), "filter", len(y) + 1, **BAR))
     innovations, F = np.empty(y.shape), np.empty((*y.shape, y.shape[-1]))
     for k, (state, after, now) in enumerate(zip(visited[:-1], visited[1:], y, strict=True)):
         expected = structure.at(k).measure(*state.predicted)
@@ -116,7 +115,7 @@ def examine(filter_: Filter, y: Array) -> Examination:
     for k, state in enumerate(visited[1:]):
         weight[k] = getattr(state.memory, "weight", 1.0)
         passed[k] &= getattr(state.memory, "passed", weight[k][:, None] > 0)
-    smoothed = looked_back(filter_, shown_progress(visited[1:], "looking back", len(y)), y)
+    smoothed = looked_back(filter_, tqdm(visited[1:], "looking back", **BAR), y)
     return Examination(
         stacked([state.posterior for state in visited[1:]]),
         stacked([state.posterior for state in smoothed]),
@@ -127,11 +126,6 @@ def examine(filter_: Filter, y: Array) -> Examination:
         getattr(visited[-1].memory, "edge", 1.0),
         getattr(visited[-1].memory, "by_component", False),
     )
-
-
-def shown_progress(items: Iterable[T], what: str, total: int) -> Iterator[T]:
-    """The items, with a bar on a terminal if they take more than two seconds."""
-    return iter(tqdm(items, desc=what, total=total, unit="row", disable=None, delay=2))
 
 
 def weights(filter_: Filter, y: Array) -> Array:

@@ -18,24 +18,34 @@ from __future__ import annotations
 import csv
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from tqdm import tqdm
 
 from kfcourse.errors import expect
+from kfcourse.files import read_text
 from kfcourse.laws import Array
 from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 
-LARGEST = 100_000_000  # bytes; a million rows.  /dev/zero never ends
 INTERVAL = "dt"
 UNEVEN = 0.01  # intervals that differ by more than this part of their median are not of one length
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-DATE = re.compile(r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d")
+DATE = r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d"
+# What to do about a cell that is no number, by the first pattern that is found in it.
+ADVICE = {
+    DATE: "a date or a clock's time: write seconds, such as "
+    "datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour twice",
+    "\u2212": "its sign is a typographic minus (U+2212): write the hyphen, -",
+    ",": "if the comma separates decimals, separate cells by semicolons",
+    r"^\D*$": "if this is a line of units, delete it: measurements begin below the names; leave a "
+    "cell empty if it is missing",
+    "": "leave the cell empty if it is missing",
+}
+# Names without signs that a column of times may have.
+CLOCK = re.compile("t|ts|tsec|date|time.*")
 
 
 class RecordError(ValueError):
@@ -108,7 +118,11 @@ def read_measurements(
         name: table.held(values[name], named[name]) for name in model.known.inputs if name in values
     }
     single = float(model.known.interval)
-    times = _times(table, named, values, single)
+    times = (
+        _times(table, values["time"], named["time"])
+        if "time" in named
+        else single * np.arange(len(table.rows))
+    )
     used = {symbol.name for symbol in model.known.symbols}
     if "t" in used - set(model.known.inputs):
         inputs["t"] = times
@@ -135,33 +149,46 @@ def intervals(times: Array, single: float = 1.0) -> Array:
 
 
 class _Table(NamedTuple):
-    """The cells of a file: names of the columns, rows with their lines, and whether decimals may
-    have commas."""
+    """The cells of a file: names of the columns, rows, and the line of each row."""
 
     path: Path
     names: list[str]
     rows: list[list[str]]
     lines: list[int]
-    comma: bool
 
     def error(self, row: int, column: str, problem: str) -> RecordError:
         return RecordError(f"{self.path}, line {self.lines[row]}, column {column}: {problem}")
 
+    def missing(self, name: str, column: str) -> str:
+        """What a message says where a column is not there: which may be it, and how to say so."""
+        listed = ", ".join(map(shown, self.names[:20])) + ", ..." * (len(self.names) > 20)
+        similar = self.similar(name)
+        if_it = f"if {shown(similar)} is it" if similar else "if one of them is it"
+        alone = "; commas, tabs or semicolons separate cells" if len(self.names) == 1 else ""
+        return (
+            f"{self.path} has no column {shown(column)}; it has {listed}{alone}: {if_it}, say so "
+            f"by columns={{{name!r}: {similar or '...'!r}}}, or --column {name}={similar or '...'}"
+        )
+
+    def similar(self, wanted: str) -> str | None:
+        """The column that may be what is wanted, in other letters or with a unit."""
+        pattern = CLOCK if wanted == "time" else re.compile(f"{re.escape(wanted.lower())}.*")
+        keys = {name: re.sub(r"[^a-z0-9]", "", name.casefold()) for name in self.names}
+        return next((name for name, key in keys.items() if pattern.fullmatch(key)), None)
+
     def numbers(self, column: str) -> Array:
         """The numbers of a column; NaN where a cell is empty."""
-        place, values = self.names.index(column), np.full(len(self.rows), np.nan)
+        place, values = self.names.index(column), np.empty(len(self.rows))
         for k, row in enumerate(self.rows):
-            text = row[place].strip()
-            if self.comma and text.count(",") == 1 and "." not in text:
-                text = text.replace(",", ".")
-            if text.lower() in ("", "nan"):
-                continue
-            if not NUMBER.fullmatch(text):
-                problem = f"expected a number or nothing, got {shown(row[place])}"
-                raise self.error(k, column, f"{problem}; {_cause(text, first=k == 0)}")
-            values[k] = float(text)
+            cell = row[place]
+            try:
+                values[k] = float(cell or "nan")
+            except ValueError:
+                advice = next(text for sign, text in ADVICE.items() if re.search(sign, cell))
+                problem = f"expected a number or nothing, got {shown(cell)}; {advice}"
+                raise self.error(k, column, problem) from None
             if np.isinf(values[k]):
-                raise self.error(k, column, f"{shown(text)} is beyond numbers of double precision")
+                raise self.error(k, column, f"{shown(cell)} is beyond numbers of double precision")
         return values
 
     def held(self, values: Array, column: str) -> Array:
@@ -171,63 +198,32 @@ class _Table(NamedTuple):
         return values[np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))]
 
 
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST + 1)
-        text = content.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise RecordError(f"no file of measurements at {path}; check the path") from None
-    except OSError as error:
-        raise RecordError(f"{path} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise RecordError(
-            f"{path}, line {line}: a byte that is not UTF-8 (perhaps UTF-16?); save the file as "
-            "CSV in UTF-8"
-        ) from None
-    if len(content) > LARGEST:
-        raise RecordError(
-            f"{path} has more than {LARGEST:,} bytes: cut it into parts, or keep the columns that "
-            f"are needed"
-        )
-    return text
-
-
 def _table(path: Path) -> _Table:
     """The cells of a file.  Of a single column an empty line is a row, too: a measurement that is
     missing."""
-    text = _text(path)
+    text = read_text(path, RecordError)
     delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
-    table = _Table(path, [], [], [], delimiter == ";")
-    lines = re.split("\r\n|\r|\n", text.rstrip())
-    shown_lines = tqdm(lines, desc=path.name, unit="row", disable=None, delay=2)
-    for number, line in enumerate(shown_lines, 1):
+    table = _Table(path, [], [], [])
+    for number, line in enumerate(text.rstrip("\r\n ").splitlines(), 1):
         try:
-            row = next(csv.reader([line], delimiter=delimiter, strict=True), [])
+            cells = next(csv.reader([line], delimiter=delimiter, strict=True)) or [""]
         except csv.Error as error:
             raise RecordError(
                 f"{path}, line {number}: {error}; a quoted cell must end in its line"
             ) from None
-        if not line.strip() and len(row) < 2 and len(table.names) != 1:
+        row = [cell.strip() for cell in cells]
+        if row == [""] and len(table.names) != 1:
             continue
         if not table.names:
-            table.names.extend(cell.strip() for cell in row)
+            table.names.extend(row)
             continue
-        if len(row) == len(table.names) == 1 and len(line.split()) > 1 < len(
-            table.names[0].split()
-        ):
-            raise RecordError(
-                f"{path} has one column, {shown(table.names[0])}: spaces do not separate cells; "
-                "write commas, tabs or semicolons between them"
-            )
-        if len(row or [""]) != len(table.names):
+        if len(row) != len(table.names):
             raise RecordError(
                 f"{path}, line {number}: {len(row)} cells, but the first line names "
                 f"{len(table.names)} columns; delete what stands above the names, separate cells "
                 "by commas, or by semicolons if commas separate decimals"
             )
-        table.rows.append(row or [""])
+        table.rows.append([cell.replace(",", ".") for cell in row] if delimiter == ";" else row)
         table.lines.append(number)
     if not table.rows:
         raise RecordError(
@@ -244,77 +240,29 @@ def _table(path: Path) -> _Table:
 def _columns(table: _Table, model: Model, given: Mapping[str, str]) -> dict[str, str]:
     """The column of each thing that the model needs, by the model's names."""
     wanted = [*model.measured, *(name for name in model.known.inputs if name != INTERVAL)]
-    if unknown := sorted(set(given) - {*wanted, INTERVAL, "time"}):
-        known = ", ".join(sorted({*wanted, INTERVAL, "time"}))
-        raise RecordError(f"columns are given for {', '.join(unknown)}; the model needs {known}")
+    known = sorted({*wanted, "time"})
+    if unknown := sorted(set(given) - set(known)):
+        raise RecordError(
+            f"columns are given for {', '.join(unknown)}; the model needs {', '.join(known)}"
+        )
     named = {name: given.get(name, name) for name in wanted}
     clocks = [name for name in ("time", "t") if name in table.names and name not in wanted]
-    interval, needed = given.get(INTERVAL, INTERVAL), INTERVAL in model.known.inputs
+    needed = INTERVAL in model.known.inputs
     if "time" in given or clocks:
         named["time"] = given.get("time") or clocks[0]
-    elif needed and interval in table.names:
-        named[INTERVAL] = interval
-    elif needed or _similar("time", table.names) not in (None, *named.values()):
-        problem = _not_there(table, "time", "time")
+    elif needed or table.similar("time") not in (None, *named.values()):
+        problem = table.missing("time", "time")
         if needed or "t" in {symbol.name for symbol in model.known.symbols}:
             raise RecordError(f"{problem}, and the model needs the times")
         warnings.warn(f"{problem}; every step is taken alike", RecordWarning, stacklevel=3)
     for name, column in named.items():
         if column not in table.names:
-            raise RecordError(_not_there(table, name, column))
+            raise RecordError(table.missing(name, column))
     return named
 
 
-def _similar(wanted: str, names: Sequence[str]) -> str | None:
-    """The column that may be what is wanted, in other letters or with a unit."""
-    keys = {name: re.sub(r"[^a-z0-9]", "", name.casefold()) for name in sorted(names)}
-    short = ("t", "ts", "tsec", "date") if wanted == "time" else ()
-    return next(
-        (name for name, key in keys.items() if key in short or key.startswith(wanted.lower())), None
-    )
-
-
-def _not_there(table: _Table, name: str, column: str) -> str:
-    """What a message says where a column is not there."""
-    listed = ", ".join(map(shown, table.names[:20])) + ", ..." * (len(table.names) > 20)
-    similar = _similar(name, table.names)
-    column_of = f"--column {name}={similar or '...'}"
-    return (
-        f"{table.path} has no column {shown(column)}; it has {listed}: "
-        f"{f'if {shown(similar)} is it' if similar else 'if one of them is it'}, say so by "
-        f"columns={{{name!r}: {similar or '...'!r}}}, or {column_of}"
-    )
-
-
-def _cause(text: str, first: bool) -> str:
-    """Why a cell may be no number, and what to do."""
-    if DATE.match(text):
-        return (
-            "a date or a clock's time: write seconds, such as "
-            "datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour twice"
-        )
-    if first and not re.search(r"\d", text):
-        return "if this is a line of units, delete it: measurements begin below the names"
-    if "\u2212" in text:
-        return "its sign is a typographic minus (U+2212): write the hyphen, -"
-    if "," in text:
-        return "if the comma separates decimals, separate cells by semicolons"
-    return "leave the cell empty if it is missing"
-
-
-def _times(
-    table: _Table, named: Mapping[str, str], values: Mapping[str, Array], interval: float
-) -> Array:
-    """Times of the rows, from their column, from that of intervals, or by the model's; RecordError
-    if they go back."""
-    if "time" not in values:
-        steps = values.get(INTERVAL, np.full(len(table.rows), interval))
-        if (steps < 0).any():
-            row = int(np.argmax(steps < 0))
-            raise table.error(row, named[INTERVAL], "an interval must not be negative")
-        held = table.held(steps, named.get(INTERVAL, INTERVAL))
-        return np.concatenate([[0.0], np.cumsum(held[:-1])])
-    times, column = values["time"], named["time"]
+def _times(table: _Table, times: Array, column: str) -> Array:
+    """Times of the rows; RecordError if one is missing, or they go back."""
     if (empty := np.isnan(times)).any():
         raise table.error(int(np.argmax(empty)), column, "empty; every row needs its time")
     if (back := np.diff(times) < 0).any():

@@ -19,12 +19,10 @@ from __future__ import annotations
 
 from itertools import islice
 
-import numpy as np
-
 from kfcourse.angles import difference
-from kfcourse.errors import expect
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.filters.approximations import aof
-from kfcourse.filters.base import Filter, State, unknown_error
+from kfcourse.filters.base import Filter
 from kfcourse.filters.iterated_ekf import seen_from
 from kfcourse.filters.looking_back import looked_back
 from kfcourse.laws import (
@@ -83,39 +81,9 @@ def smooth(filter_: Filter, y: Array, lag: int | None = None) -> Gaussian:
     [0.944, 1.833, 2.556, 3.278]
     """
     expect(filter_, Filter, "smooth")
-    return stacked([state.posterior for state in _looked_back(filter_, y, lag)])
-
-
-def smoothing_error(filter_: Filter, y: Array, lag: int | None = None) -> Array:
-    """How far the exact filter's estimates of `smooth` may be from the true means given the record,
-    (steps, runs), in the units of x.  Arguments as of `smooth`.
-
-    Raises
-    ------
-    ValueError
-        Another filter: how good its normal laws are it does not know.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from kfcourse import Model
-    >>> from kfcourse.filters import pointmass
-    >>> from kfcourse.records import smoothing_error
-    >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
-    >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
-    True
-    """
-    expect(filter_, Filter, "smoothing_error")
-    if filter_.look_back is None:
-        raise unknown_error(filter_)
-    return np.stack(
-        [state.memory.discretisation_error() for state in _looked_back(filter_, y, lag)]
-    )
-
-
-def _looked_back(filter_: Filter, y: Array, lag: int | None) -> list[State]:
     y = measurements(filter_, y)
-    return looked_back(filter_, islice(walk(filter_, y), 1, None), y, lag)
+    states = looked_back(filter_, islice(walk(filter_, y), 1, None), y, lag)
+    return stacked([state.posterior for state in states])
 
 
 def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:
@@ -145,11 +113,7 @@ def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian
         `rounds` is not a whole number above 0; measurements of another shape.
     """
     expect(structure, Structure, "smooth_iterated")
-    if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 1:
-        raise ValueError(
-            f"rounds must be a whole number, at least 1 (which is smooth(aof(structure), y)); got "
-            f"{rounds!r}"
-        )
+    expect_sizes(rounds=rounds)
     law = smooth(aof(structure), y)
     for _ in range(rounds - 1):
         law = smooth(aof(affine_at(structure, law)), y)

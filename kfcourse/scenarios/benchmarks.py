@@ -37,19 +37,8 @@ from kfcourse.symbolic.model import Model
 DATA = resources.files("kfcourse.scenarios") / "data"
 MODELS = tomllib.loads((DATA / "benchmarks.toml").read_text(encoding="utf-8"))
 
-# What was published; of whom and of what data/benchmarks.toml says.
-_PUBLISHED = MODELS["published"]
-PENDULUM_ERRORS: dict[str, float] = _PUBLISHED["pendulum_errors"]
-PENDULUM_SMOOTHED: dict[str, float] = _PUBLISHED["pendulum_smoothed"]
-CAR_ERRORS: dict[str, float] = _PUBLISHED["car_errors"]
-GROWTH_ERRORS: dict[str, float] = _PUBLISHED["growth_errors"]
-GROWTH_ELSEWHERE: dict[str, float] = _PUBLISHED["growth_elsewhere"]
-BEARINGS_ERRORS: dict[str, float] = _PUBLISHED["bearings_errors"]
-REENTRY_ERRORS: dict[str, float] = _PUBLISHED["reentry_errors"]
-CUBIC_SENSOR: dict[str, float] = _PUBLISHED["cubic_sensor"]
-LORENZ_ERRORS: dict[str, float] = _PUBLISHED["lorenz_errors"]
-EXACT_MUL: list[float] = _PUBLISHED["exact_mul"]
-DOUBLE_WELL: list[float] = _PUBLISHED["double_well"]
+# What was published, by name; of whom and of what data/benchmarks.toml says.
+PUBLISHED: dict[str, Any] = MODELS["published"]
 LORENZ_EVERY = 25  # steps between measurements
 
 

@@ -27,10 +27,6 @@ def rms_by_part(error: Array, part: Array) -> Estimate:
 def rms_difference(error: Array, other: Array, part: Array) -> Estimate:
     """RMS of `error` less that of `other` by part, as `rms_by_part`, on common runs: the standard
     error is of the pair."""
-    if error.shape[1] != other.shape[1]:
-        raise ValueError(
-            f"both errors must be of the same runs, got {error.shape[1]} and {other.shape[1]}"
-        )
     return Estimate.jackknife(_roots(error, part) - _roots(other, part))
 
 

@@ -14,21 +14,21 @@ follows:
 
     (x', y') = V (cos psi, sin psi),   psi' = omega
 
-Between the parts these functions change along the step 3 u^2 - 2 u^3, so position, velocity and
-acceleration are continuous.
+Between the parts they change along the step 3 u^2 - 2 u^3, Hermite's cubic with level ends, so
+position, velocity and acceleration are continuous.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from scipy.interpolate import CubicHermiteSpline
 
 from kfcourse.errors import expect_positive
 from kfcourse.laws import Array
 
-STEP = Polynomial([0, 0, 3, -2])  # from 0 to 1 over 0 <= u <= 1, with zero slope at both ends
 START = np.array([-15_000.0, 25_000.0, 8_500.0])  # m; the first course is along x
 TURNS = (1.5 * np.pi, np.pi)  # rad; of parts 2 and 4, to the left
 DURATIONS = (120.0, 60.0, 100.0)  # s; of parts 1, 3 and 5
@@ -93,7 +93,7 @@ def aircraft(
     Raises
     ------
     ValueError
-        A number that is not positive and finite, a manoeuvre shorter than its two ramps, a flight
+        A number that is not positive and finite, a manoeuvre no longer than its two ramps, a flight
         that ends below the ground.
     """
     expect_positive(interval=interval, ramp=ramp)
@@ -105,73 +105,57 @@ def aircraft(
     circles = [angle / rate + ramp for angle, rate in zip(TURNS, rates, strict=True)]
     lengths = [DURATIONS[0], circles[0], DURATIONS[1], circles[1], DURATIONS[2]]
     for number, length in zip((2, 3, 4, 5), lengths[1:], strict=True):
-        if length < 2 * ramp:
+        if length <= 2 * ramp:
             raise ValueError(
-                f"part {number} lasts {length:.4g} s, less than its two ramps of {ramp:g} s; make "
-                f"it longer or the ramp shorter"
+                f"part {number} lasts {length:.4g} s, no longer than its two ramps of {ramp:g} s; "
+                f"make it longer or the ramp shorter"
             )
     ends = np.cumsum(lengths)
     time = interval * np.arange(int(ends[-1] / interval * (1 + 1e-12)) + 1)
 
-    deceleration = (speeds[0] - speeds[1]) / (lengths[2] - ramp)
+    def stepped(*changes: tuple[float, float]) -> CubicHermiteSpline:
+        """The function of time that is 0 at first and from each moment on goes to a level, in the
+        time of a ramp."""
+        moments, levels = [0.0], [0.0]
+        for moment, level in changes:
+            moments, levels = [*moments, moment, moment + ramp], [*levels, levels[-1], level]
+        moments, levels = [*moments, ends[-1]], [*levels, levels[-1]]
+        return CubicHermiteSpline(moments, levels, np.zeros(len(levels)))
 
-    def speed_and_heading(t: Array) -> tuple[Array, Array]:
-        first, second = (_plateau_integral(t, ends[i], ends[i + 1], ramp) for i in (0, 2))
-        speed = speeds[0] - deceleration * _plateau_integral(t, ends[1], ends[2], ramp)
-        return speed, rates[0] * first + rates[1] * second
-
-    speed, psi = speed_and_heading(time)
-    turn_rate = rates[0] * _plateau(time, ends[0], ends[1], ramp) + rates[1] * _plateau(
-        time, ends[2], ends[3], ramp
+    loss = (speeds[0] - speeds[1]) / (lengths[2] - ramp)
+    turning = stepped(
+        (ends[0], rates[0]), (ends[1] - ramp, 0), (ends[2], rates[1]), (ends[3] - ramp, 0)
     )
-    slowing = -deceleration * _plateau(time, ends[1], ends[2], ramp)
-    since = (time - ends[2]) / ramp  # the descent begins with part 4 and goes on
-    forward = np.stack([np.cos(psi), np.sin(psi)], axis=-1)
-    left = np.stack([-np.sin(psi), np.cos(psi)], axis=-1)
-
-    altitude = START[2] - descent * ramp * _step_integral(since)
+    slowing, sinking = stepped((ends[1], -loss), (ends[2] - ramp, 0)), stepped((ends[2], -descent))
+    gained, heading, sunk = (rate.antiderivative() for rate in (slowing, turning, sinking))
+    altitude = START[2] + sunk(time)
     if not altitude.min() > 0:
         raise ValueError(
             f"the aircraft would end at the altitude {altitude[-1]:.4g} m; lower `descent`, "
             f"or make the circle of part 4 smaller"
         )
-    knots = np.concatenate([ends[:-1], ends[:-1] + ramp, ends[1:-1] - ramp])
-    path = _path(time, knots, speed_and_heading)
-    position = np.column_stack([START[:2] + path, altitude])
-    velocity = np.column_stack([speed[:, None] * forward, -descent * _step(since)])
-    horizontal = slowing[:, None] * forward + (speed * turn_rate)[:, None] * left
-    acceleration = np.column_stack(
-        [horizontal, -descent / ramp * STEP.deriv()(np.clip(since, 0.0, 1.0))]
+
+    def horizontal(t: Array) -> Array:
+        return (speeds[0] + gained(t)) * np.stack([np.cos(heading(t)), np.sin(heading(t))])
+
+    course = horizontal(time)
+    along = slowing(time) / (speeds[0] + gained(time)) * course
+    across = turning(time) * np.stack([-course[1], course[0]])
+    position = np.column_stack(
+        [START[:2] + _path(time, np.union1d(turning.x, slowing.x), horizontal), altitude]
     )
+    velocity = np.column_stack([course.T, sinking(time)])
+    acceleration = np.column_stack([(along + across).T, sinking.derivative()(time)])
     part = 1 + np.searchsorted(ends[:-1], time, side="right")
     return Track(time, position, velocity, acceleration, part)
 
 
-def _step(u: Array) -> Array:
-    return STEP(np.clip(u, 0.0, 1.0))
-
-
-def _step_integral(u: Array) -> Array:
-    return STEP.integ()(np.clip(u, 0.0, 1.0)) + np.maximum(u - 1.0, 0.0)
-
-
-def _plateau(t: Array, start: float, end: float, ramp: float) -> Array:
-    """From 0 up to 1 and down again between start and end."""
-    return _step((t - start) / ramp) - _step((t - end) / ramp + 1)
-
-
-def _plateau_integral(t: Array, start: float, end: float, ramp: float) -> Array:
-    """Its integral, end - start - ramp in all."""
-    return ramp * (_step_integral((t - start) / ramp) - _step_integral((t - end) / ramp + 1))
-
-
-def _path(time: Array, knots: Array, speed_and_heading) -> Array:
-    """The integral of V (cos psi, sin psi) from 0 to each moment, (steps, 2), by Gauss's rule on
+def _path(time: Array, knots: Array, velocity: Callable[[Array], Array]) -> Array:
+    """The integral of a velocity in the plane from 0 to each moment, (steps, 2), by Gauss's rule on
     pieces that end at the knots."""
     inside = knots[knots < time[-1]]
     moments = np.unique(np.concatenate([time, inside, np.arange(0.0, time[-1], PIECE)]))
     middle, half = (moments[1:] + moments[:-1]) / 2, np.diff(moments) / 2
-    speed, psi = speed_and_heading(middle[:, None] + half[:, None] * NODES)
-    pieces = np.stack([speed * np.cos(psi), speed * np.sin(psi)]) @ WEIGHTS * half
+    pieces = velocity(middle[:, None] + half[:, None] * NODES) @ WEIGHTS * half
     path = np.concatenate([np.zeros((1, 2)), np.cumsum(pieces.T, axis=0)])
     return path[np.searchsorted(moments, time)]

@@ -35,12 +35,11 @@ from kfcourse.linear.runs import Run, run
 from kfcourse.linear.system import LinearSystem
 
 DT = sp.Symbol("Delta", positive=True)
-_AXES = sp.eye(2)
-
-# r' = r + Delta v + Delta^2 a / 2,  v' = v + Delta a, on both axes.
-TRANSITION = sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([[1, DT], [0, 1]]), _AXES))
-INPUT = sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([DT**2 / 2, DT]), _AXES))
-SENSITIVITY = sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([[1, 0]]), _AXES))
+# r' = r + Delta v + Delta^2 a / 2,  v' = v + Delta a, y = r: A, B and H of one axis, and of two.
+ONE_AXIS = sp.Matrix([[1, DT], [0, 1]]), sp.Matrix([DT**2 / 2, DT]), sp.Matrix([[1, 0]])
+TRANSITION, INPUT, SENSITIVITY = (
+    sp.ImmutableMatrix(sp.kronecker_product(matrix, sp.eye(2))) for matrix in ONE_AXIS
+)
 
 # Position, velocity and acceleration at the last of three samples (r0, r1, r2), by the parabola
 # through them.
@@ -52,7 +51,7 @@ MINIMUM_JERK = Polynomial([0, 0, 0, 10, -15, 6])
 
 
 def uniform_acceleration(
-    interval: float, acceleration_sd: float, measurement_sd: float
+    interval: float, acceleration_sd: float, measurement_sd: float, axes: int = 2
 ) -> LinearSystem:
     """The filter's model for samples every `interval` seconds.
 
@@ -67,12 +66,14 @@ def uniform_acceleration(
         samples, px/s^2.
     measurement_sd : float
         Standard deviation of the noise of each coordinate, px.
+    axes : int
+        2, of `TRANSITION`, `INPUT` and `SENSITIVITY`; 3 in space.
     """
     expect_positive(interval=interval)
     expect_not_negative(acceleration_sd=acceleration_sd, measurement_sd=measurement_sd)
-    A, B, H = (_numeric(matrix, interval) for matrix in (TRANSITION, INPUT, SENSITIVITY))
+    A, B, H = (np.kron(_numeric(matrix, interval), np.eye(axes)) for matrix in ONE_AXIS)
     Q = acceleration_sd**2 * (B @ B.T)
-    return LinearSystem(A, H, 0.5 * (Q + Q.T), measurement_sd**2 * np.eye(2), B)
+    return LinearSystem(A, H, 0.5 * (Q + Q.T), measurement_sd**2 * np.eye(axes), B)
 
 
 def start_up(y: Array, interval: float, R: Array) -> Gaussian:

@@ -11,9 +11,8 @@ import numpy as np
 
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.runs import run
-from kfcourse.linear.system import LinearSystem, linear_system
-from kfcourse.scenarios.pointer import acceleration_from
-from kfcourse.scenarios.radar import kinematic
+from kfcourse.linear.system import LinearSystem
+from kfcourse.scenarios.pointer import acceleration_from, uniform_acceleration
 
 
 def roughly_known(
@@ -95,11 +94,6 @@ def kalman_positions(
     control : bool
         The first two steps have none, nor has one with a missing measurement among its last three.
     """
-    free = linear_system(kinematic(interval, noise_sd=noise_sd, measurement_sd=measurement_sd))[0]
-    if not control:
-        return run(free, start, y).posterior.mean[..., :3]
-    B = np.kron([[interval**2 / 2], [interval]], np.eye(3))
-    driven = LinearSystem(free.A, free.H, free.Q, free.R, B)
-    return run(driven, start, y, np.nan_to_num(acceleration_from(y, interval))).posterior.mean[
-        ..., :3
-    ]
+    system = uniform_acceleration(interval, noise_sd, measurement_sd, axes=3)
+    u = np.nan_to_num(acceleration_from(y, interval)) if control else None
+    return run(system, start, y, u).posterior.mean[..., :3]

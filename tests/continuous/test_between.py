@@ -35,8 +35,7 @@ from kfcourse.lab.variants import summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
 from kfcourse.records import estimate
 from kfcourse.scenarios.benchmarks import (
-    DOUBLE_WELL,
-    EXACT_MUL,
+    PUBLISHED,
     benes,
     double_well,
     exact_mul,
@@ -214,11 +213,11 @@ def test_the_derived_equations_are_the_page_s(name):
 @pytest.mark.parametrize(
     ("model", "data", "printed", "allowed"),
     [
-        (exact_mul(*EXACT_MUL[:2]), "exact-mul", EXACT_MUL[2], 5e-4),
+        (exact_mul(*PUBLISHED["exact_mul"][:2]), "exact-mul", PUBLISHED["exact_mul"][2], 5e-4),
         pytest.param(
-            double_well(*DOUBLE_WELL[:-1]),
+            double_well(*PUBLISHED["double_well"][:-1]),
             "double-well",
-            DOUBLE_WELL[-1],
+            PUBLISHED["double_well"][-1],
             1e-4,
             marks=pytest.mark.slow,
         ),
@@ -237,7 +236,7 @@ def test_log_likelihoods_are_the_published_ones(model, data, printed, allowed):
 def test_the_estimates_of_the_exact_multiplicative_object():
     fitted = estimate(exact_mul(-0.1, 0.1), jimenez_data("exact-mul")[1], ["a", "b"], ["b"])
     # his sum leaves the first measurement out
-    assert fitted.value == pytest.approx(EXACT_MUL[:2], abs=2e-3)
+    assert fitted.value == pytest.approx(PUBLISHED["exact_mul"][:2], abs=2e-3)
 
 
 # ---------------------------------------------------------------- Benes

@@ -4,7 +4,7 @@ import pytest
 
 from kfcourse import Model
 from kfcourse.lab import FILTERS
-from kfcourse.lab.admission import admissions, table
+from kfcourse.lab.admission import admissions
 
 pytestmark = pytest.mark.quick
 
@@ -79,10 +79,3 @@ def test_what_can_be_built_and_will_not_do_is_warned_of(variant53):
     )
     result = verdicts(growth, ["aof-gauss-hermite"])
     assert "points an axis in place of 5" in result["aof-gauss-hermite"].says
-
-
-def test_a_line_for_each_filter():
-    result = admissions(Model.define("0.9*x + v", "sign(x) + w"), ["duof", "aof-exact"])
-    lines = table(result).splitlines()
-    assert lines[0].split() == ["duof", "DUOF", "yes"]
-    assert lines[1] == "aof-exact  exact AOF  yes"

@@ -191,16 +191,6 @@ def test_a_moment_of_a_few_trajectories_is_refused():
     assert bounded(x).ok
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e100])
-def test_infinite_trajectories_are_found_with_their_step(bad):
-    x = np.random.default_rng(1).normal(size=(6, 100, 2))
-    x[4, 17, 1] = bad
-    with np.errstate(over="ignore"):
-        quality_ = bounded(x)
-    assert quality_.ok is False
-    assert "infinite (step 4)" in quality_.says
-
-
 # --- observable
 
 
@@ -222,16 +212,6 @@ def test_the_share_of_a_linear_variant_is_that_of_the_riccati_equation():
     1.4 % at a step, and at some ten independent steps."""
     share = examine(SHIPPED["1"], 10_000).findings["observable"].value
     assert share == pytest.approx(riccati(STEPS), rel=4 * np.sqrt(2 / 10_000 / 10))
-
-
-def test_a_share_that_is_not_known_well_is_not_enough():
-    """Behind this meter 0.84 is left: below UNSEEN = 0.9, but by less than four standard errors of
-    256 trajectories."""
-    sharp = variant("0.9*x + 0.3*v", "x + f*w", {"f": 3.5})
-    few, many = (examine(sharp, runs).findings["observable"] for runs in (256, 8_000))
-    assert few.value < 0.9
-    assert not few.ok
-    assert many.ok
 
 
 def test_linear_is_linear_in_state_and_noise():
@@ -322,7 +302,6 @@ def test_what_is_generated_is_read_back(generated, tmp_path):
     (read,), (before,) = load_variants(path).values(), generated.variants
     assert (read.name, read.model, read.title) == ("g1", before.model, before.title)
     assert read.model.prior.cov.tolist() == before.model.prior.cov.tolist()
-    assert not examine(read, 512, seed=77).linear and sum(generated.rejected.values()) > 0
 
 
 @pytest.mark.slow
@@ -332,53 +311,28 @@ def test_the_same_seed_generates_the_same_text_whatever_the_processes(generated)
     assert again.rejected == generated.rejected
 
 
-@pytest.fixture
-def judged(monkeypatch):
-    """Candidates x' = c x + i v with c = 0, 1, ..., i = c // 2, of the findings chosen, without any
-    simulation."""
+def test_candidates_are_rejected_for_each_reason_and_formulas_are_seldom_repeated(monkeypatch):
+    """Candidates x' = c x + i v with c = 0, 1, ..., i = c // 2, of which the first four have a
+    fault and the fifth is linear, without any simulation."""
 
-    def use(*findings):
-        def judge(candidate, *_):
-            c = int(candidate["parameters"]["c"])
-            return Quality(
-                "", GOOD | (findings[c] if c < len(findings) else {}), linear=c == len(findings)
-            )
+    def judge(candidate, *_):
+        c = int(candidate["parameters"]["c"])
+        fault = {name: Finding(False, "") for name in [*GOOD][c : c + 1]}
+        return Quality("", GOOD | fault, linear=c == len(GOOD))
 
-        def proposed(seed, index):
-            return {
-                "state": f"c*x + {index // 2}*v",
-                "meter": "x + w",
-                "parameters": {"c": float(index)},
-            }
+    def proposed(c):
+        return {"state": f"c*x + {c // 2}*v", "meter": "x + w", "parameters": {"c": float(c)}}
 
-        monkeypatch.setattr(grammar, "_judge", judge)
-        monkeypatch.setattr(grammar, "propose", proposed)
-
-    return use
-
-
-def test_candidates_are_rejected_for_each_reason(judged):
-    judged(*({name: Finding(False, "")} for name in GOOD))
-    quality_ = generate(3, jobs=1)
-    assert quality_.rejected == Counter(
-        {name: 1 for name in GOOD} | {"linear": 1, "formulas of another one": 1}
-    )
-    assert [float(each.model.parameters["c"]) for each in quality_.variants] == [5, 6, 8]
-    assert [each.name for each in quality_.variants] == ["g1", "g2", "g3"]
-
-
-def test_a_search_without_end_is_given_up_and_formulas_are_seldom_repeated(judged, monkeypatch):
-    judged()
-    monkeypatch.setattr(
-        grammar,
-        "propose",
-        lambda *_: {"state": "0.9*x + v", "meter": "x + w", "parameters": {"c": 9}},
-    )
-    monkeypatch.setattr(grammar, "read_variant", lambda name, *_: name)
-    quality_ = generate(4, jobs=1)
-    assert quality_.variants == ["g1"] and quality_.rejected == {
-        "formulas of another one": 4 * 20 - 1
-    }
+    monkeypatch.setattr(grammar, "_judge", judge)
+    monkeypatch.setattr(grammar, "propose", lambda _, index: proposed(index))
+    few = generate(3, jobs=1)
+    others = "formulas of another one"
+    assert few.rejected == Counter({name: 1 for name in GOOD} | {"linear": 1, others: 1})
+    assert [float(each.model.parameters["c"]) for each in few.variants] == [5, 6, 8]
+    assert [each.name for each in few.variants] == ["g1", "g2", "g3"]
+    monkeypatch.setattr(grammar, "propose", lambda *_: proposed(9))  # a search without end
+    outcome = generate(4, jobs=1)
+    assert len(outcome.variants) == 1 and outcome.rejected == {others: 4 * 20 - 1}
     assert len(generate(150, jobs=1).variants) == 4
 
 
@@ -402,26 +356,19 @@ def test_check_says_by_its_status_whether_all_are_well_posed(call, tmp_path):
     assert "variant boom is not well posed, bounded: the second moment grows" in result.stdout
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    """`generate` without computing: it finds two variants at most."""
-
-    def made(wanted, seed, runs, jobs, ask):
-        quality_ = [
+def test_proposals_are_printed_or_go_to_a_new_file(call, tmp_path, monkeypatch):
+    def made(wanted, seed, *_):
+        proposals = [
             read_variant(f"g{i + 1}", propose(seed, i), "the test") for i in range(min(wanted, 2))
         ]
-        return grammar.Generated(quality_, Counter({"bounded": 3, "linear": 1}))
+        return grammar.Generated(proposals, Counter({"bounded": 3, "linear": 1}))
 
     monkeypatch.setattr(grammar, "generate", made)
-
-
-def test_proposals_are_printed_or_go_to_a_new_file(call, quick, tmp_path):
     result = call("--generate 2 --seed 9")
     assert result.exit_code == 0
     assert list(tomllib.loads(result.stdout)["variants"]) == ["g1", "g2"]
-    assert result.stdout.startswith(
-        "# Made by: kfcourse variants --generate 2 --seed 9 --runs 40000\n"
-    )
+    made_by = "# Made by: kfcourse variants --generate 2 --seed 9 --runs 40000\n"
+    assert result.stdout.startswith(made_by)
     assert result.stderr == "4 candidates rejected: 3 bounded, 1 linear\n"
     result = call("--generate 3 --out new.toml")  # too few are written, and it is said
     assert (result.exit_code, result.stdout) == (1, "")
@@ -460,17 +407,3 @@ def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
     result = call(arguments)
     assert result.exit_code == 2
     assert "Traceback" not in result.output
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ("--variant 999", "no variant '999'; there are 53, 1, 2"),
-        ("--variants nothing.toml", "nothing.toml"),
-        ("--variants mine.toml", "variant a in mine.toml"),
-    ],
-)
-def test_what_cannot_be_checked_is_named(call, tmp_path, arguments, message):
-    (tmp_path / "mine.toml").write_text('[variants.a]\nstate = "x + v"\nmeter = "3 + w"\n')
-    result = call("--check", arguments)
-    assert result.exit_code == 1 and message in result.stderr

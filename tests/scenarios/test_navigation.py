@@ -12,7 +12,7 @@ import numpy as np
 import oracles
 import pytest
 import scipy.linalg
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from kfcourse import Gaussian
 from kfcourse.linear.consistency import nees
@@ -22,7 +22,6 @@ from kfcourse.scenarios.navigation import (
     Inputs,
     Observation,
     Sensor,
-    follow,
     fuse,
     observe,
     sample,
@@ -171,7 +170,6 @@ def test_what_is_observed():
     ("timing", "message"),
     [
         ({"latency": -0.1}, "latency must be finite and not negative"),
-        ({"offset": np.nan}, "offset must be finite"),
         ({"clock": Clock(0.0)}, "positive finite rate"),
     ],
 )
@@ -312,7 +310,7 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
             "prior's mean must have the shape (2,) or (1, 2), its covariance",
         ),
         (
-            {"sensors": [Sensor.define("short", ["s"], "s + w", 1.0)]},
+            {"sensors": [Sensor.define("short", ["s"], "s + w", 1.0, 0.1)]},
             "short was defined with 1 state component(s)",
         ),
         ({"dynamics": DRIVEN}, "have 1 known input(s); give them"),
@@ -332,45 +330,7 @@ def test_fuse_says_what_is_wrong(changes, message):
         fuse(**{**usual, "observations": [], **changes})
 
 
-# ---------------------------------------------------------------- recorded data: innovations, no
-# period
-
-
-def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_same():
-    sensors, times = two_sensors(latency=0.3, jitter=0.2), np.linspace(0.1, 4, 14)
-    _, messages = measured(sensors, 3.0, 2, [0.0])
-    followed = follow(FREE, sensors, PRIOR, messages, times)
-    assert_array_equal(followed.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean)
-    ordered = sorted(messages, key=lambda message: message.tag)
-    assert [(each.sensor, each.time) for each in followed.innovations] == [
-        (m.sensor, pytest.approx(m.tag)) for m in ordered
-    ]
-    for last in (0, 5, -1):  # each is what the estimate of all that was captured before leaves
-        now, newest = ordered[last], followed.innovations[last]
-        earlier = [m._replace(arrival=m.tag) for m in ordered if m.tag < now.tag]
-        before = fuse(FREE, sensors, PRIOR, earlier, [now.tag])
-        H, R = METERS[now.sensor]
-        assert_allclose(newest.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING)
-        cov = np.broadcast_to(H @ before.cov[0, :1] @ H.T + R, newest.cov.shape)
-        assert_allclose(newest.cov, cov, rtol=0, atol=ROUNDING)
-
-
-def test_a_recorded_sensor_needs_no_period():
-    given, free = (Sensor.define("s", STATES, "s + w", 0.5, *period) for period in ([0.25], []))
-    messages = [
-        Observation("s", tag, tag, np.array([[value]]))
-        for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))
-    ]
-    laws = [fuse(FREE, [each], PRIOR, messages, np.array([1.0])) for each in (given, free)]
-    assert_array_equal(laws[0].mean, laws[1].mean)
-    with pytest.raises(ValueError, match="s has no period, as a recorded sensor"):
-        free.captures(1.0)
-
-
-@pytest.mark.parametrize(
-    ("times", "readings"),
-    [([0, 1, 2], [9, 7, 5]), ([1, np.nan, 3], [1, 2, 3]), ([1], [1])],
-)
-def test_no_clock_runs_backwards(times, readings):
+@pytest.mark.parametrize("readings", [[9, 7, 5], [1, np.nan, 3], [1, 1, 1]])
+def test_no_clock_runs_backwards(readings):
     with pytest.raises(ValueError, match="readings"):
-        Clock.fit(times, readings)
+        Clock.fit([0, 1, 2], readings)

@@ -5,34 +5,30 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.pointer import (
     SHORTEST,
-    acceleration_from,
     follow,
     hand_track,
     sample,
     start_up,
     uniform_acceleration,
 )
+from kfcourse.scenarios.radar import kinematic
 
 pytestmark = pytest.mark.quick
 
 # ---------------------------------------------------------------- the model
 
 
-def test_the_matrices_are_those_of_the_paper():
+@pytest.mark.parametrize("axes", [2, 3])
+def test_the_matrices_are_those_of_the_radar_and_the_input_pushes_as_the_noise(axes):
     dt, sd = 0.1, 7.0
-    model_ = uniform_acceleration(dt, sd, 3.0)
-    F = [[1, 0, dt, 0], [0, 1, 0, dt], [0, 0, 1, 0], [0, 0, 0, 1]]
-    G = np.diag([dt**2 / 2, dt**2 / 2, dt, dt])  # acts on (ax, ay, ax, ay)
-    assert_allclose(model_.A, F, rtol=1e-15)
-    assert_allclose(model_.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
-    assert_allclose(model_.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
-    assert_allclose(model_.R, 9 * np.eye(2), rtol=1e-15)
-    # Covariance of what a random acceleration (ax, ay), constant in the interval, does to (x, y,
-    # vx, vy).
-    effect = G @ np.array([[1, 0], [0, 1], [1, 0], [0, 1]])
-    assert_allclose(model_.Q, sd**2 * effect @ effect.T, rtol=1e-13)
+    system = uniform_acceleration(dt, sd, 3.0, axes)
+    expected = linear_system(kinematic(dt, dimensions=axes, noise_sd=sd, measurement_sd=3.0))[0]
+    for name in ("A", "H", "Q", "R"):
+        assert_allclose(getattr(system, name), getattr(expected, name), rtol=1e-13)
+    assert_allclose(system.B, np.kron([[dt**2 / 2], [dt]], np.eye(axes)), rtol=1e-14)
 
 
 # ---------------------------------------------------------------- start-up
@@ -90,25 +86,14 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
 # ---------------------------------------------------------------- errors
 
 
-@pytest.mark.parametrize("interval", [0.0, np.nan])
-def test_an_interval_that_is_none(interval):
-    track, y = hand_track(1, strokes=2), np.zeros((5, 1, 2))
-    for call in (
-        lambda: uniform_acceleration(interval, 1.0, 1.0),
-        lambda: start_up(y[:3], interval, np.eye(2)),
-        lambda: acceleration_from(y, interval),
-        lambda: sample(track, interval, 1.0, 1, 0),
-    ):
-        with pytest.raises(ValueError, match="interval must be positive and finite"):
-            call()
-
-
 def test_arguments_that_do_not_fit():
     y = np.zeros((5, 1, 2))
     system = uniform_acceleration(0.1, 1.0, 1.0)
     missing = y.copy()
     missing[1, 0, 0] = np.nan
     for call, message in (
+        (lambda: uniform_acceleration(0.0, 1.0, 1.0), "interval must be positive and finite"),
+        (lambda: sample(hand_track(1), np.nan, 1.0, 1, 0), "interval must be positive and finite"),
         (lambda: uniform_acceleration(0.1, -1.0, 1.0), "acceleration_sd must be finite and not"),
         (lambda: uniform_acceleration(0.1, 1.0, np.nan), "measurement_sd must be finite and not"),
         (lambda: start_up(y, 0.1, np.eye(2)), "three complete samples of two coordinates"),

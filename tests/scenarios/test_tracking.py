@@ -1,15 +1,15 @@
-"""The Kalman filter of the radar chapters against one written step by step, and the start against
-what it promises."""
+"""The Kalman filter of the radar chapters on an accelerated track, and the start against what it
+promises."""
 
 from __future__ import annotations
 
 import numpy as np
-import oracles
 import pytest
 from numpy.testing import assert_allclose
 
 from kfcourse import Gaussian
 from kfcourse.linear import covariances
+from kfcourse.linear.runs import run
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
 from kfcourse.scenarios.tracking import kalman_positions, roughly_known
@@ -17,24 +17,16 @@ from kfcourse.scenarios.tracking import kalman_positions, roughly_known
 T, SIGMA = 0.8, 100.0
 
 
-@pytest.mark.parametrize("control", [False, True])
-def test_positions_step_by_step(control):
-    rng = np.random.default_rng(1)
-    y, start = (
-        rng.normal(size=(6, 2, 3)),
-        Gaussian(rng.normal(size=(2, 6)), np.diag([2.0, 3, 1, 4, 1, 5])),
-    )
-    A = np.kron([[1, T], [0, 1]], np.eye(3))
-    B, H = np.kron([[T**2 / 2], [T]], np.eye(3)), np.kron([[1, 0]], np.eye(3))
-    u = np.zeros((6, 2, 3))
-    if control:
-        u[2:] = (y[2:] - 2 * y[1:-1] + y[:-2]) / T**2
-    estimates = kalman_positions(y, T, 0.5, 2.0, start, control)
-    for i in range(2):
-        steps = [(A, a, 0.25 * B @ B.T, H, np.zeros(3), 4.0 * np.eye(3)) for a in u[:, i] @ B.T]
-        loop = oracles.kalman_loop(steps, (start.mean[i], start.cov), y[:, i])
-        expected = [mean[:3] for _, (mean, _) in loop]
-        assert_allclose(estimates[:, i], expected, rtol=1e-10, atol=1e-12)  # rounding
+def test_with_the_control_an_accelerated_track_is_followed_from_the_third_measurement_on():
+    """Without noise, the start known: the two steps without control leave an error, which later
+    measurements take away."""
+    acceleration, t = np.array([3.0, -2.0, 1.0]), T * np.arange(60)[:, None, None]
+    y = 5 + 7 * t + acceleration * t**2 / 2
+    start = Gaussian(np.array([5.0, 5, 5, 7, 7, 7]), np.diag([2.0, 3, 1, 4, 1, 5]))
+    free, driven = (kalman_positions(y, T, 0.5, 2.0, start, control) for control in (False, True))
+    system = linear_system(kinematic(T, noise_sd=0.5, measurement_sd=2.0))[0]
+    assert_allclose(free, run(system, start, y).posterior.mean[..., :3], rtol=1e-12)
+    assert np.abs(driven - y)[-1].max() < 1e-6 < 0.1 < np.abs(free - y)[-1].max()
 
 
 def test_a_rough_start_has_the_gain_that_is_asked_for_and_spreads_as_it_says():

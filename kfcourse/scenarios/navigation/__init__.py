@@ -8,13 +8,12 @@ Sensor, Clock, observe    what the sensors say of it: a list of `Observation`, i
                           arrival
 fuse                      the filter: each measurement is used at its moment of capture, however
                           late it comes
-follow                    the same, with its innovations
 
 Chapters "Integration of sensors" and "Rates and time tags" of the book; lecture 12.
 """
 
 from kfcourse.scenarios.navigation.dynamics import Dynamics, Inputs, Path, Transition, sample
-from kfcourse.scenarios.navigation.fusion import follow, fuse
+from kfcourse.scenarios.navigation.fusion import fuse
 from kfcourse.scenarios.navigation.sensors import Clock, Observation, Sensor, observe
 
 __all__ = [
@@ -25,7 +24,6 @@ __all__ = [
     "Path",
     "Sensor",
     "Transition",
-    "follow",
     "fuse",
     "observe",
     "sample",

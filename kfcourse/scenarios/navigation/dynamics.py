@@ -19,26 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike
 
 from kfcourse.errors import expect_not_negative
 from kfcourse.laws import Array, Gaussian, apply, is_covariance, square_root, symmetric
 from kfcourse.linear.runs import check_prior
 
-# s (or periods): moments that differ by less are the same but for rounding; float64 holds days to
-# 1e-11 s
-ROUNDING = 1e-9
-# units in the last place by which a moment that is computed in two ways differs: tag to time, sums
-# of intervals
-LAST_PLACES = 4
+# s: moments that differ by less are the same but for rounding; stamps of Unix hold 2e-7 s
+ROUNDING = 1e-6
 TRANSITIONS = 4096  # intervals remembered: sensors of fixed rates need a few, random delays many
-
-
-def rounding(*moments: ArrayLike) -> float:
-    """By how much moments may differ that are the same but for rounding: more at stamps of Unix,
-    which hold 2e-7 s."""
-    largest = max(float(np.max(np.abs(moment), initial=0.0)) for moment in moments)
-    return max(ROUNDING, LAST_PLACES * float(np.spacing(largest)))
 
 
 class Transition(NamedTuple):
@@ -150,11 +138,10 @@ class Path(NamedTuple):
 
     def __call__(self, times: Array) -> Array:
         """States (len(times), runs, n); ValueError for a time that is not stored."""
-        slack = rounding(self.times, times)
         index = np.minimum(
-            np.searchsorted(self.times, np.asarray(times) - slack), len(self.times) - 1
+            np.searchsorted(self.times, np.asarray(times) - ROUNDING), len(self.times) - 1
         )
-        missing = np.flatnonzero(np.abs(self.times[index] - times) > 2 * slack)
+        missing = np.flatnonzero(np.abs(self.times[index] - times) > 2 * ROUNDING)
         if len(missing):
             raise ValueError(
                 f"the path is not known at t = {np.asarray(times)[missing[0]]:.16g} s; sample it "

@@ -24,7 +24,13 @@ import numpy as np
 from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, correct, stacked
 from kfcourse.linear.runs import check_prior
-from kfcourse.scenarios.navigation.dynamics import Dynamics, Inputs, Predictor, predictor, rounding
+from kfcourse.scenarios.navigation.dynamics import (
+    ROUNDING,
+    Dynamics,
+    Inputs,
+    Predictor,
+    predictor,
+)
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
 
 
@@ -37,42 +43,12 @@ class Event(NamedTuple):
     value: Array
 
 
-class Innovation(NamedTuple):
-    """What a measurement told beyond the prediction, at its moment of capture.
-
-    Attributes
-    ----------
-    sensor : str
-    time : float
-        Of the filter.
-    innovation : ndarray (runs, p)
-        NaN where missing.
-    cov : ndarray (runs, p, p) or (1, p, p)
-        F, as the filter expected it.
-    """
-
-    sensor: str
-    time: float
-    innovation: Array
-    cov: Array
-
-
 class Past(NamedTuple):
-    """What the filter remembers: the law right after an event, and what this told; the prior has
-    none."""
+    """What the filter remembers: the law right after an event; the prior has none."""
 
     time: float
     law: Gaussian
     event: Event | None = None
-    innovation: Innovation | None = None
-
-
-class Followed(NamedTuple):
-    """Estimates, as of `fuse`, and the innovations of all measurements, in the order of their
-    moments."""
-
-    law: Gaussian
-    innovations: list[Innovation]
 
 
 def fuse(
@@ -116,25 +92,6 @@ def fuse(
         Sensors not known or of another state, moments not finite, before 0, or after the
         arrival; a prior with a negative variance; shapes that do not fit.
     """
-    return follow(dynamics, sensors, prior, observations, times, inputs=inputs, by=by).law
-
-
-def follow(
-    dynamics: Dynamics,
-    sensors: Sequence[Sensor],
-    prior: Gaussian,
-    observations: Sequence[Observation],
-    times: Array,
-    *,
-    inputs: Inputs | None = None,
-    by: str = "tag",
-) -> Followed:
-    """As `fuse`, with the innovations: each as it was when all measurements captured before it had
-    come.
-
-    Arguments and errors as of `fuse`.  What arrives after the last of `times` is not used, and told
-    nothing.
-    """
     expect(dynamics, Dynamics, "fuse")
     predict, n = predictor(dynamics, inputs), len(dynamics.A)
     for sensor in sensors:
@@ -145,26 +102,20 @@ def follow(
                 "Sensor.define takes the names of all, in the order of the motion"
             )
     moments = _checked_times(times)
-    stamps = [stamp for message in observations for stamp in (message.tag, message.arrival)]
-    slack = rounding(moments, *stamps)
-    events = sorted(_events(sensors, observations, by, slack), key=lambda event: event.arrival)
+    events = sorted(_events(sensors, observations, by), key=lambda event: event.arrival)
     # seconds that the filter must remember
     depth = max((event.arrival - event.time for event in events), default=0.0)
     history = [Past(0.0, _checked_prior(prior, n, events, inputs))]
-    laws, innovations, taken = [], list[Innovation](), 0
+    laws, taken = [], 0
     for now in moments:
-        arrived = events[
-            taken : bisect_right(events, now + slack, lo=taken, key=lambda event: event.arrival)
-        ]
-        taken += len(arrived)
+        until = bisect_right(events, now + ROUNDING, key=lambda event: event.arrival)
+        arrived, taken = events[taken:until], until
         history = _replayed(history, arrived, predict)
         laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
         # from the last law at or before the earliest moment that a measurement may still come from
-        oldest = bisect_right(history, now - depth - slack, key=lambda past: past.time) - 1
-        innovations += [past.innovation for past in history[: max(oldest, 0)] if past.innovation]
+        oldest = bisect_right(history, now - depth - ROUNDING, key=lambda past: past.time) - 1
         history = history[max(oldest, 0) :]
-    innovations += [past.innovation for past in history if past.innovation]
-    return Followed(stacked(laws), innovations)
+    return stacked(laws)
 
 
 def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
@@ -177,11 +128,8 @@ def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> 
     history = history[:kept]
     for event in sorted(again, key=lambda event: event.time):
         law = predict(history[-1].law, history[-1].time, event.time)
-        expected = event.sensor.measure(*law)
-        innovation, F = expected.innovation(event.value), expected.F
-        of = event.sensor.name, event.time, innovation, F.reshape(-1, *F.shape[-2:])
-        law = correct(law, expected, event.value)
-        history.append(Past(event.time, law, event, Innovation(*of)))
+        law = correct(law, event.sensor.measure(*law), event.value)
+        history.append(Past(event.time, law, event))
     return history
 
 
@@ -189,7 +137,6 @@ def _events(
     sensors: Sequence[Sensor],
     observations: Sequence[Observation],
     by: str,
-    slack: float,
 ) -> list[Event]:
     if by not in ("tag", "arrival"):
         raise ValueError(f'measurements are used by "tag" or by "arrival", not by {by!r}')
@@ -210,14 +157,14 @@ def _events(
         if np.isinf(value).any():
             raise ValueError(f"{name}: a measurement must be finite, or NaN where it is missing")
         time = sensor.clock.time(tag) if by == "tag" else arrival
-        if time > arrival + slack:
+        if time > arrival + ROUNDING:
             raise ValueError(
                 f"{name}: captured at t = {time:.16g} s by its tag, but arrived before that, at "
                 f"{arrival:.16g} s; "
                 f"the filter's clock for this sensor, {sensor.clock}, must be wrong: Clock.fit "
                 f"finds it from interrupts"
             )
-        if time < -slack:
+        if time < -ROUNDING:
             raise ValueError(
                 f"{name}: captured at t = {time:.16g} s, before the prior, at 0; leave it out"
             )

@@ -22,11 +22,11 @@ import numpy as np
 from kfcourse.angles import on_circle
 from kfcourse.errors import expect_not_negative, expect_positive
 from kfcourse.laws import Array, Measurement, square_root
-from kfcourse.scenarios.navigation.dynamics import rounding
+from kfcourse.scenarios.navigation.dynamics import ROUNDING
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, ModelError
-from kfcourse.symbolic.structure import Structure, linearised
+from kfcourse.symbolic.structure import linearised
 
 
 class Clock(NamedTuple):
@@ -84,37 +84,29 @@ class Sensor:
     name : str
     model : Model
         Its meter equation is the sensor's; the state equation is not used.
-    period : float, optional
-        Between samples, in s of its own clock; None for recorded data, whose moments are those of
-        their observations.
+    period : float
+        Between samples, in s of its own clock.
     offset : float
         Its clock's reading at some sample.
     latency, jitter : float
         The data arrive latency + jitter * U after the capture (s), U uniform in (0, 1): the filter
         does not use these.
     clock : Clock
-    structure : callable
-        Model -> Structure, which approximation of the meter the filter uses: `linearised`,
-        `gaussian`, `unscented`.
     """
 
     name: str
     model: Model
-    period: float | None = None
+    period: float
     offset: float = 0.0
     latency: float = 0.0
     jitter: float = 0.0
     clock: Clock = field(default_factory=Clock)
-    structure: Callable[[Model], Structure] = linearised
 
     def __post_init__(self) -> None:
         # data cannot arrive before they are captured
         timing = {"latency": self.latency, "jitter": self.jitter}
         expect_not_negative(**{f"{self.name}: {name}": value for name, value in timing.items()})
-        if self.period is not None:
-            expect_positive(**{f"{self.name}: the period": self.period})
-        if not math.isfinite(self.offset):
-            raise ValueError(f"{self.name}: offset must be finite, got {self.offset}")
+        expect_positive(**{f"{self.name}: the period": self.period})
         if self.model.timed:
             raise ModelError(
                 f"{self.name}: the meter depends on the step, {self.model.known.symbols}, but a "
@@ -134,7 +126,7 @@ class Sensor:
         states: Sequence[str],
         meter: Formula | Sequence[Formula],
         variance: Any,
-        period: float | None = None,
+        period: float,
         *,
         parameters: Mapping[str, float] | None = None,
         angles: Sequence[str] | None = None,
@@ -151,7 +143,7 @@ class Sensor:
             In the states, the noise w (w1, w2, ... in a list) and the parameters.
         variance : float, list or matrix
             Of the noise.
-        period : float, optional
+        period : float
         parameters : dict, optional
         angles : list of names, optional
             Components of the measurement, y or y1, y2, ..., that are angles.
@@ -183,19 +175,13 @@ class Sensor:
     @cached_property
     def measure(self) -> Callable[[Array, Array], Measurement]:
         """Structural functions of the meter: (m (..., n), d (..., n, n)) -> Measurement."""
-        return self.structure(self.model).measure
+        return linearised(self.model).measure
 
     def captures(self, duration: float) -> Array:
-        """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a
-        period, or for no duration."""
+        """Moments of capture from 0 to duration, in the filter's time (s,)."""
         expect_not_negative(duration=duration)
-        if self.period is None:
-            raise ValueError(
-                f"{self.name} has no period, as a recorded sensor: its observations have their "
-                f"moments; give one to simulate it"
-            )
         ends = [(self.clock.reading(end) - self.offset) / self.period for end in (0.0, duration)]
-        first, last = math.ceil(ends[0] - rounding(*ends)), math.floor(ends[1] + rounding(*ends))
+        first, last = math.ceil(ends[0] - ROUNDING), math.floor(ends[1] + ROUNDING)
         times = self.clock.time(self.offset + self.period * np.arange(first, last + 1))
         return np.clip(times, 0.0, duration)
 

@@ -364,7 +364,7 @@ def test_a_killed_worker_is_told():
         ("exercises --variant 99", "no variant '99'; there are 53, 1,"),
         ("solutions --variant 53 --sets b,zz", "no exercise set zz; there are a, b"),
         ("solutions --variant 53 --sets ,", "no exercise set"),
-        ("exercises --variant 53 --variants no.toml", "no file of variants at no.toml"),
+        ("exercises --variant 53 --variants no.toml", "no.toml cannot be read"),
         ("exercises --students no.csv", "no course list no.csv"),
         ("exercises --students no.csv --nbgrader", "the same notebooks to all students"),
         # two notebooks never share a file
