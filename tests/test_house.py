@@ -198,7 +198,7 @@ ROOMS = {
     "benchmarks": 4_930,
     "book": 29_260,
     "exercises/*.py": 830,
-    "exercises/checks": 20_120,
+    "exercises/checks": 17_930,
     "exercises/derivations": 14_990,
     "exercises/grading": 17_420,
     "exercises/notebooks": 8_050,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_900,
+    "tests": 187_660,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
