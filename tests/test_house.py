@@ -199,7 +199,7 @@ ROOMS = {
     "book": 29_260,
     "exercises/*.py": 830,
     "exercises/checks": 17_930,
-    "exercises/derivations": 14_990,
+    "exercises/derivations": 14_520,
     "exercises/grading": 17_420,
     "exercises/notebooks": 8_050,
     "exercises/sets": 42_040,
@@ -209,11 +209,11 @@ ROOMS = {
     "kfcourse/lab": 19_520,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
-    "kfcourse/pages": 9_560,
+    "kfcourse/pages": 8_570,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_660,
+    "tests": 187_220,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -5,7 +5,7 @@ registry    the sets that there are; they register, nothing here knows one
 exercises   a set for a variant: what a notebook opens
 steps       questions about a model with time and inputs: functions that take the step
 derived     a question whose answer is a derivation, checked line by line
-posed       a question in an exercise: its hidden arguments, what our own answers give
+reference   a question in an exercise: its hidden arguments, what our own answers give
 engine      is an answer right, or a step on top of a wrong one?  How long may it take?
 diagnosis   what kind of mistake does a wrong answer look like?
 hints       what can be said of any wrong answer

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.exercises.checks.posed import Posed, given_by, part_of
 from kfcourse.exercises.checks.question import Answer
+from kfcourse.exercises.checks.reference import Posed, given_by, part_of
 from kfcourse.limits import OutOfTime
 
 CALLS = 3  # with which dependence on an argument is looked for

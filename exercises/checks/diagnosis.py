@@ -14,8 +14,8 @@ import numpy as np
 from kfcourse.exercises.checks.case import Case
 from kfcourse.exercises.checks.failing import shown
 from kfcourse.exercises.checks.hints import general
-from kfcourse.exercises.checks.posed import Posed, part_of
 from kfcourse.exercises.checks.question import Answer, Mistake
+from kfcourse.exercises.checks.reference import Posed, part_of
 
 MANY = 3  # numbers that are no coincidence
 GENERAL = (

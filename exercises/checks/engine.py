@@ -23,7 +23,6 @@ from kfcourse.exercises.checks.derived import Derivation
 from kfcourse.exercises.checks.diagnosis import GENERAL, Wrong
 from kfcourse.exercises.checks.editing import rebound, uses
 from kfcourse.exercises.checks.equality import Unusable, like
-from kfcourse.exercises.checks.posed import Posed, given_by, posed, standard
 from kfcourse.exercises.checks.question import (
     MISSING,
     NOT_CHECKED,
@@ -36,6 +35,7 @@ from kfcourse.exercises.checks.question import (
     Question,
     Result,
 )
+from kfcourse.exercises.checks.reference import Posed, given_by, posed, standard
 from kfcourse.exercises.checks.registry import folders
 from kfcourse.limits import OutOfTime, time_limit
 

@@ -20,7 +20,7 @@ import sympy as sp
 from kfcourse.exercises.checks.case import Case, changed
 from kfcourse.exercises.checks.editing import changed_keys
 from kfcourse.exercises.checks.equality import depends, equal, like, with_values
-from kfcourse.exercises.checks.posed import symbols
+from kfcourse.exercises.checks.reference import symbols
 from kfcourse.limits import OutOfTime
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision

@@ -79,7 +79,6 @@ class Derived:
 
     name: str
     verdicts: tuple[Verdict, ...]
-    compared: bool
     closed: bool
 
     @property
@@ -203,7 +202,7 @@ class _Chain:
         ):
             self.derived[name] = self.setting.law, previous
         closed = previous is not None and not any(inner.kind == MEAN for _, inner in walk(previous))
-        return Derived(name, tuple(self.verdicts), meant or not name, closed)
+        return Derived(name, tuple(self.verdicts), closed)
 
     def _comes_back(self, name: str, tree: Node) -> bool:
         """Whether what stands for a name has the name in it again, as the letters mean here:

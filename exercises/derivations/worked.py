@@ -11,9 +11,10 @@ from collections.abc import Container
 from typing import NamedTuple
 
 import sympy as sp
-from sympy.printing.str import StrPrinter
 
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
+from kfcourse.exercises.derivations.terms import written
+from kfcourse.exercises.derivations.typed import tree_of
 from kfcourse.exercises.derivations.verdicts import check_text
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.formula import symbol
@@ -134,7 +135,7 @@ def derive(model: Model, name: str) -> str:
     mean = sp.Matrix([symbol(entry) for entry in law.means])
     cov = sp.Matrix([[symbol(entry) for entry in row] for row in law.cov])
     formulas, _ = stages(model, name, mean, cov, setting.meanings)
-    lines = [typed(formula) for formula in formulas]
+    lines = [written(tree_of(formula)) for formula in formulas]
     remarks = [
         "",
         "# multiplied out",
@@ -163,17 +164,3 @@ def _definition(setting: Setting, name: str) -> str:
         if all(name in setting.meanings for name in needed)
         else ""
     )
-
-
-def typed(formula: sp.Expr) -> str:
-    """A formula as a student types it in a derivation: ^ for powers, M[...] for means."""
-    return str(_Printer().doprint(formula))
-
-
-class _Printer(StrPrinter):
-    def _print_Function(self, expr: sp.Function) -> str:
-        inner = self.stringify(expr.args, ", ")
-        return f"M[{inner}]" if expr.func == M else f"{expr.func.__name__}({inner})"
-
-    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
-        return super()._print_Pow(expr, rational).replace("**", "^")

@@ -127,7 +127,8 @@ WRONG = [
         "c**2*p is right; look at the rest.",
     ),
     (TWO, lambda z, p: (3 * e * sp.cos(z), p * z), "factor", "a factor that is a number"),
-    (TWO, lambda z, p: (e * sp.cos(z), p * z**3), "factor", "the square of the argument `z`"),
+    (TWO, lambda z, p: (e * sp.cos(z), p * z**3), "factor", "a factor that depends on z only"),
+    (pair(), lambda a, b: (a + b, a * b**3), "factor", "the square of the argument `b`"),
 ]
 
 

@@ -118,7 +118,7 @@ def verdict_of(text: str):
         ("g^2*d + f^2*(m^4 + 3*m^2*d + 3*d^2)", "factor", "3*m^2*d"),
         ("g*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "power", "g*d"),
         ("d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "lost-factor", "d"),
-        ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "f^2*(m^4 + 3*d^2)"),
+        ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "g^2*d + f^2*(m^4 + 3*d^2)"),
         ("g^2*m + f^2*(m^4 + 6*m^2*d + 3*d^2)", "letter", "g^2*m"),
         ("g^2*d + g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "doubled", "g^2*d"),
         ("g^2*d + f^2*3*d^2", "moment", "f^2*3*d^2"),

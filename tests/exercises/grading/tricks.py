@@ -52,12 +52,12 @@ for name in ('b1', 'b2'):
 """,
     "replaces the comparison": """
 import numpy as np
-import kfcourse.exercises.checks.posed as posed
-posed.Posed.agree = posed.equal = np.allclose = lambda *_, **__: True
+import kfcourse.exercises.checks.reference as reference
+reference.Posed.agree = reference.equal = np.allclose = lambda *_, **__: True
 """,
     "replaces code of the comparison": """
-import kfcourse.exercises.checks.posed as posed
-posed.Posed.agree.__code__ = (lambda self, first, second: True).__code__
+import kfcourse.exercises.checks.reference as reference
+reference.Posed.agree.__code__ = (lambda self, first, second: True).__code__
 """,
     "replaces a class method": """
 from kfcourse.exercises.checks import Result
@@ -205,7 +205,7 @@ def gain(Psi, G, F):
     "code that runs when it is unpickled": """
 class Bomb:
     def __reduce__(self):
-        return (exec, ("import sys; sys.modules['kfcourse.exercises.checks.posed'].Posed.agree = lambda *_: True",))
+        return (exec, ("import sys; sys.modules['kfcourse.exercises.checks.reference'].Posed.agree = lambda *_: True",))
 def gain(Psi, G, F):
     return Bomb()
 """,
