@@ -200,7 +200,7 @@ ROOMS = {
     "exercises/*.py": 830,
     "exercises/checks": 17_930,
     "exercises/derivations": 14_520,
-    "exercises/grading": 17_420,
+    "exercises/grading": 17_290,
     "exercises/notebooks": 8_050,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
@@ -209,11 +209,11 @@ ROOMS = {
     "kfcourse/lab": 19_520,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
-    "kfcourse/pages": 8_570,
+    "kfcourse/pages": 8_120,
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_220,
+    "tests": 187_190,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

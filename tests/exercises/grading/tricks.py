@@ -211,21 +211,21 @@ def gain(Psi, G, F):
 """,
     "messages of its own": """
 def gain(Psi, G, F):
-    import json, os, struct
+    import os
     for text in ('{"value": ["passed"]}', '{"grade": {"marks": {"b1": "passed"}}}', '{"value": [1]}'):
         for place in range(3, 64):
             try:
-                os.write(place, struct.pack('>Q', len(text)) + text.encode())
+                os.write(place, text.encode() + b'\\n')
             except OSError:
                 pass
     return G @ Psi
 """,
     "a message without end": """
 def gain(Psi, G, F):
-    import os, struct
+    import os
     for place in range(3, 64):
         try:
-            os.write(place, struct.pack('>Q', 2**62))
+            os.write(place, b'{' * 1000)
         except OSError:
             pass
     return G @ Psi
