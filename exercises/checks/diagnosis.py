@@ -131,19 +131,10 @@ class Wrong:
         ]
         call = min(wrong, key=lambda call: sum(map(np.size, posed.arguments[call])))
         mine, right = self.answered[call], posed.expected[call]
-        place = next(
-            (
-                place
-                for place in range(len(self.parts))
-                if not posed.agree([mine[place]], [right[place]])
-            ),
-            None,
-        )
-        if place is not None:
-            mine, right = mine[place], right[place]
-        part = "" if place is None else self.parts[place]
-        axes = posed.question.axes
-        return shown(posed.names, posed.arguments[call], mine, right, part, axes, posed.values)
+        for part, own, wanted in zip(self.parts, mine, right, strict=True) if self.parts else ():
+            if not posed.agree([own], [wanted]):
+                return shown(posed, call, own, wanted, part)
+        return shown(posed, call, mine, right, "")
 
 
 def _lead(mistakes: Sequence[Mistake]) -> Lead:

@@ -94,10 +94,10 @@ def printed(
     """A printed function of arrays and coefficients that writes arrays; one array, `value`, as
     `kfFigure.values` calls it."""
     results = made if isinstance(made, Mapping) else {"value": made}
-    columns = (
+    before, after = (
         {key: sp.Matrix([formula]) for key, formula in of.items()} for of in (given, results)
     )
-    return javascript.loop(name, *columns, coefficients=letters)
+    return javascript.loop(name, before, after, coefficients=letters)
 
 
 def rounded(rows: Iterable[Iterable[float]]) -> list[list[float]]:
