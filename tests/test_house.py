@@ -198,8 +198,8 @@ ROOMS = {
     "benchmarks": 4_930,
     "book": 29_260,
     "exercises/*.py": 830,
-    "exercises/checks": 17_930,
-    "exercises/derivations": 14_520,
+    "exercises/checks": 17_690,
+    "exercises/derivations": 14_420,
     "exercises/grading": 17_290,
     "exercises/notebooks": 8_050,
     "exercises/sets": 42_040,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 187_190,
+    "tests": 187_180,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import copy
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -241,12 +241,11 @@ class _Check:
             return self._says(
                 UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
             )
-        message = judged.message
-        if judged.status == PASSED:
+        if judged.passed:
             self.past.given.pop(question.name, None)
         elif self._times(answered) and question.advice:
-            message += f" {question.advice}"
-        return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
+            return replace(judged, message=f"{judged.message} {question.advice}")
+        return judged
 
     def _wrong(self, answered: list[Any]) -> Result:
         times, follows = self._times(answered), self._follows(answered)

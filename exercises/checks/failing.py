@@ -26,8 +26,8 @@ def shown(posed: Posed, call: int, answered: Any, expected: Any, part: str) -> s
         where, value = _of_array(posed, call, answered, expected)
     else:
         where, value = _of_formula(posed, call, answered)
-        if value is None:
-            return ""
+    if value is None:
+        return ""
     yours = f"result {part} is" if part else "function gives"
     return f"An example{where} your {yours} {_numbers(value)}."
 
@@ -53,7 +53,7 @@ def _of_formula(posed: Posed, call: int, answered: Any) -> tuple[str, np.ndarray
 
 def _of_array(
     posed: Posed, call: int, answered: np.ndarray, expected: np.ndarray
-) -> tuple[str, np.ndarray]:
+) -> tuple[str, np.ndarray | None]:
     """The first place that is wrong, with the arguments there, and the value."""
     axes, tolerance = posed.question.axes, posed.question.tolerance
     place: tuple[int, ...] = ()

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from kfcourse.exercises.derivations.compared import EQUAL, compare
 from kfcourse.exercises.derivations.setting import Setting
 from kfcourse.exercises.derivations.terms import (
     CALL,
@@ -43,7 +42,7 @@ from kfcourse.exercises.derivations.terms import (
     walk,
     written,
 )
-from kfcourse.exercises.derivations.values import ENTIRE, Uncomputed, Values
+from kfcourse.exercises.derivations.values import ENTIRE, EQUAL, Uncomputed, Values, compare
 from kfcourse.laws import Array
 
 CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import sympy as sp
 
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
-from kfcourse.exercises.derivations.terms import written
+from kfcourse.exercises.derivations.terms import has_mean, written
 from kfcourse.exercises.derivations.typed import tree_of
 from kfcourse.exercises.derivations.verdicts import check_text
 from kfcourse.limits import OutOfTime, time_limit
@@ -100,7 +100,8 @@ def right_derivation(model: Model) -> Worked | None:
             (chain,) = check_text(text, None, setting).chains
     except (Exception, OutOfTime):  # of SymPy, at a formula that it cannot average
         return None
-    return Worked(model, name, text) if chain.right and chain.closed else None
+    closed = chain.end is not None and not has_mean(chain.end)
+    return Worked(model, name, text) if chain.right and closed else None
 
 
 def worth_deriving(model: Model) -> str:

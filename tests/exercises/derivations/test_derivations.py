@@ -15,10 +15,10 @@ from derivation_corpus import chains, planted
 from weekly import weekly
 
 from kfcourse.exercises.derivations import check_text, verdicts
-from kfcourse.exercises.derivations.compared import DIFFERENT, EQUAL, compare
 from kfcourse.exercises.derivations.setting import of_model, of_side
 from kfcourse.exercises.derivations.terms import at, letter, written
 from kfcourse.exercises.derivations.typed import read_line, tree_of
+from kfcourse.exercises.derivations.values import DIFFERENT, EQUAL, compare
 from kfcourse.lab import find_variant, load_variants
 from kfcourse.symbolic.structure import gaussian, linearised
 
