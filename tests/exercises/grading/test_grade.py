@@ -629,21 +629,6 @@ def test_strange_claims_are_explained(claim):
 @pytest.mark.parametrize(
     ("name", "given", "source", "expected"),
     [
-        (
-            "7",
-            "53",
-            f'task = exercise("b", {EASY!r})',
-            [
-                "for variant 7, and marked as variant 53, which was given",
-                "marked as variant 53, which was given, and opens one of its own that has this name",
-            ],
-        ),
-        (
-            "53",
-            "",
-            f'task = exercise("b", {EASY!r})',
-            ["marked as variant 53, and opens one of its own that has this name"],
-        ),
         ("53", "", 'x = exercise("a", variant="7")', ["opens set a, variant 7"]),
         ("53", "53", "exercise(letter, 1)\n!ls", []),
         ("53", "53", 'task = exercise("b", "53")', []),
