@@ -198,10 +198,10 @@ ROOMS = {
     "benchmarks": 4_930,
     "book": 29_260,
     "exercises/*.py": 830,
-    "exercises/checks": 17_690,
-    "exercises/derivations": 14_420,
+    "exercises/checks": 17_590,
+    "exercises/derivations": 14_410,
     "exercises/grading": 17_130,
-    "exercises/notebooks": 8_050,
+    "exercises/notebooks": 7_970,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
     "kfcourse/continuous": 10_140,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 185_810,
+    "tests": 185_790,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

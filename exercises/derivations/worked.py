@@ -11,6 +11,7 @@ from collections.abc import Container
 from typing import NamedTuple
 
 import sympy as sp
+from sympy.codegen.cfunctions import expm1
 
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
 from kfcourse.exercises.derivations.terms import has_mean, written
@@ -47,7 +48,7 @@ def stages(
     elif name[0] == "G":
         inner = sp.diff(a, model.x[digits[-1]])
     else:
-        means = [plain(law.mean_of(part)) for part in (a, b)]
+        means = [without_expm1(law.mean_of(part)) for part in (a, b)]
         for place, i in enumerate((digits[0], digits[-1])):
             letter = ("tau" if name[0] == "T" else "h") + (f"{i + 1}" if len(side) > 1 else "")
             if letter in known:
@@ -69,13 +70,15 @@ def stages(
         of_noise, of_state = inside.as_independent(*model.x, as_Add=False)
         mean_of_noise = law.mean_of(of_noise)
         quiet += sp.factor(outside) * mean_of_noise * (1 if of_state == 1 else M(of_state))
-        closed += sp.factor(outside).subs(values) * mean_of_noise * plain(law.mean_of(of_state))
+        closed += (
+            sp.factor(outside).subs(values) * mean_of_noise * without_expm1(law.mean_of(of_state))
+        )
     return [M(inner), split, quiet, closed, sp.expand(closed)], law
 
 
-def plain(formula: sp.Expr) -> sp.Expr:
-    """The formula without NumPy's expm1."""
-    return formula.replace(lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
+def without_expm1(formula: sp.Expr) -> sp.Expr:
+    """The formula as people write it: NumPy's expm1 keeps the digits of e^u - 1 in the code."""
+    return formula.replace(expm1, lambda u: sp.exp(u) - 1)
 
 
 class Worked(NamedTuple):
