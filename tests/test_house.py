@@ -199,7 +199,7 @@ ROOMS = {
     "book": 29_260,
     "exercises/*.py": 830,
     "exercises/checks": 17_590,
-    "exercises/derivations": 14_410,
+    "exercises/derivations": 14_390,
     "exercises/grading": 17_130,
     "exercises/notebooks": 7_970,
     "exercises/sets": 42_040,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 185_790,
+    "tests": 185_710,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

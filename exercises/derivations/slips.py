@@ -65,7 +65,6 @@ NUMBERS = [  # in front of a term
     *(Fraction(p, q) for q in range(1, 7) for p in range(1, 7) if p != q and gcd(p, q) == 1),
 ]
 POWERS = (1, 2, 3, 4, Fraction(1, 2), -1, -2)
-PROBES = Fraction(17, 60), Fraction(71, 60), Fraction(-49, 60)  # values of a node
 OF_THE_LINE_ABOVE = 1.0  # an addition to the cost
 
 
