@@ -299,6 +299,9 @@ def entries(case: Case) -> Said | None:
     pairs = [(np.asarray(a), np.asarray(b)) for a, b in case.pairs]
     shapes = {b.shape[lead:] for _, b in pairs}
     shape = shapes.pop()
+    # a row of numbers may be anything: trajectories, modes
+    if case.numeric and lead + len(shape) < 2:
+        return None
     if shapes or len(shape) not in (1, 2) or max(shape) > 6:
         return None
     wrong = [
