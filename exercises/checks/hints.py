@@ -57,7 +57,7 @@ OF_RESULT: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("factor-2", "It is half of what it should be.", lambda v: v / 2),
     ("factor-half", "It is twice what it should be.", lambda v: 2 * v),
     ("inverse", INVERSE, lambda v: each(v, lambda entry: 1 / entry)),
-    ("inverse", INVERSE, lambda v: np.linalg.inv(v)),
+    ("inverse", INVERSE, np.linalg.inv),
     (
         "square",
         "It is the square of what it should be, as a variance is of a standard deviation.",
@@ -96,7 +96,7 @@ def results(case: Case) -> Iterator[Row]:
         yield (
             "another-result",
             f"That is what belongs in the place of {name}.",
-            partial(list, expected),
+            expected.copy,
         )
     for place, name in enumerate(case.posed.names if case.numeric else ()):
         given = [values[place] for values in case.posed.arguments]
@@ -296,13 +296,12 @@ def factor_or_term(case: Case) -> Said | None:
 def entries(case: Case) -> Said | None:
     """Some entries of a matrix, or some components of a vector."""
     lead = len(case.posed.question.axes) if case.numeric else 0
-    pairs = [(np.asarray(a), np.asarray(b)) for a, b in case.pairs]
+    pairs = [tuple(map(np.asarray, pair)) for pair in case.pairs]
     shapes = {b.shape[lead:] for _, b in pairs}
     shape = shapes.pop()
-    # a row of numbers may be anything: trajectories, modes
-    if case.numeric and lead + len(shape) < 2:
-        return None
     if shapes or len(shape) not in (1, 2) or max(shape) > 6:
+        return None
+    if case.numeric and len(shape) + lead == 1:  # it may be anything: trajectories, modes
         return None
     wrong = [
         place
