@@ -201,7 +201,7 @@ ROOMS = {
     "exercises/checks": 17_590,
     "exercises/derivations": 14_390,
     "exercises/grading": 17_130,
-    "exercises/notebooks": 7_970,
+    "exercises/notebooks": 7_950,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_510,
     "kfcourse/continuous": 10_140,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 185_710,
+    "tests": 185_700,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
