@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 6_250,
     "kfcourse/scenarios": 10_800,
     "kfcourse/symbolic": 20_980,
-    "tests": 185_700,
+    "tests": 185_650,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -229,16 +229,12 @@ def test_positive_is_declared_and_not_guessed():
         ("g^2·d", "column 8: · (middle dot) has no meaning"),
         ("__import__('os').system('true')", "a function that is not known here"),
         ("g.real", "has no meaning here"),
-        ("open(g)", "a function that is not known here"),
         ("g^g", "an exponent must be a plain number"),
         ("g^999", "the exponent is larger than 16"),
-        ("9^9^9^9", "an exponent must be a plain number"),
         ("(" * 250 + "g" + ")" * 250, "nested"),
         ("-" * 1900 + "g", "deep"),
         ("g+" * 900 + "g", "more than 600"),
-        ("g" * 3000, "at most 2000"),
         ("M[g, d]", "takes one expression"),
-        ("", "empty"),
     ],
 )
 def test_what_cannot_be_read_is_marked_in_words(line, says):
