@@ -108,8 +108,17 @@ MADE = {
     "fig-live-lab": lambda: explore.live_lab(
         "fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")}
     ),
-    "fig-two-beats": lambda: explore.two_beats(
-        "fig-two-beats", x, y, following, *BEATS, PLACE, 2.2
+    "fig-two-beats": lambda: explore.drawn(
+        "fig-two-beats",
+        "Correction and prediction",
+        "two-beats",
+        [
+            explore.printed("prior", {"x": x}, BEATS[0]),
+            explore.printed("likelihood", {"x": x}, BEATS[1], {y: "y"}),
+            explore.printed("transition", {"x": x, "next": following}, BEATS[2]),
+            explore.printed("place", {"x": x}, PLACE),
+        ],
+        2.2,
     ),
     "fig-better-line": sine_and_lines,
     "fig-lab-gains": lab_gains,
@@ -119,19 +128,28 @@ MADE = {
     "fig-consistency-faults": lambda: scenes.hidden_fault(
         "fig-consistency-faults", WALK, WALKED.x[..., 0], WALKED.y[..., 0]
     ),
-    "fig-slips-ball": lambda: scenes.slip(
+    "fig-slips-ball": lambda: explore.drawn(
         "fig-slips-ball",
-        Delta,
-        (n, v),
-        sigma,
-        SHAKEN,
-        HILLS,
-        DRAWS,
-        dict(sigma=2.0, draw=1, k=30),
-        (0.5, 4.0),
+        "A ball on the potential",
+        "slip",
+        [
+            explore.printed(
+                "step", {"Delta": Delta, "n": n, "v": v}, {"Delta": SHAKEN}, {sigma: "sigma"}
+            ),
+            explore.printed("potential", {"Delta": Delta}, HILLS, {sigma: "sigma"}),
+        ],
+        {
+            "noises": DRAWS.tolist(),
+            "first": {"sigma": 2.0, "draw": 1, "k": 30},
+            "range": (0.5, 4.0),
+        },
     ),
-    "fig-grid-nodes": lambda: scenes.grid_step(
-        "fig-grid-nodes", x, ONE_DISTANCE, 1.0, (-5, 5), (0.05, 2.0)
+    "fig-grid-nodes": lambda: explore.drawn(
+        "fig-grid-nodes",
+        "Masses on a grid",
+        "grid-step",
+        [explore.printed("density", {"x": x}, ONE_DISTANCE)],
+        {"first": 1.0, "low": -5, "high": 5, "least": 0.05, "most": 2.0},
     ),
     "front": lambda: scenes.who_leads("front", MAP, (2, 0.4)),
 }

@@ -46,7 +46,7 @@ from kfcourse.exercises.derivations.terms import (
     written,
 )
 from kfcourse.exercises.derivations.typed import read_line
-from kfcourse.exercises.derivations.worked import plain, stages
+from kfcourse.exercises.derivations.worked import stages, without_expm1
 from kfcourse.symbolic.formula import symbol
 
 LAWS = (None, None, ("mu", "P"), ("lambda", "Psi"))
@@ -383,7 +383,7 @@ def formula_of(node: Node, moments: GaussianMoments) -> sp.Expr:
 
 @cache
 def mean_of(moments: GaussianMoments, formula: sp.Expr) -> sp.Expr:
-    return plain(moments.mean_of(formula))
+    return without_expm1(moments.mean_of(formula))
 
 
 def differs_formula(chain: Chain, node: Node, formula: sp.Expr) -> bool:

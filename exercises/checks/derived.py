@@ -11,18 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from kfcourse.exercises.checks.equality import Unusable
-from kfcourse.exercises.checks.question import PASSED, WRONG, Question
+from kfcourse.exercises.checks.question import PASSED, WRONG, Question, Result
 from kfcourse.exercises.derivations import DerivationError, Report, Verdict, check_text
-from kfcourse.exercises.derivations.compared import EQUAL, compare
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
-from kfcourse.exercises.derivations.terms import MEAN, Node, letter, letters, walk, written
-from kfcourse.exercises.derivations.typed import read_line
-from kfcourse.exercises.derivations.values import Uncomputed
+from kfcourse.exercises.derivations.terms import Node, has_mean, letter, letters, written
+from kfcourse.exercises.derivations.values import EQUAL, Uncomputed, compare
 from kfcourse.exercises.derivations.verdicts import (
     AGAIN,
     BEGINS,
@@ -33,7 +31,7 @@ from kfcourse.exercises.derivations.verdicts import (
     UNREADABLE,
     Derived,
 )
-from kfcourse.symbolic.formula import FormulaError, symbol
+from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 
 if TYPE_CHECKING:
@@ -100,15 +98,6 @@ def posed_by(model: Model, name: str) -> Posed:
     )
 
 
-class Judged(NamedTuple):
-    """What a check says of a derivation; fields as of `Result`."""
-
-    status: str
-    message: str
-    diagnosis: tuple[str, ...] = ()
-    share: float = 0.0
-
-
 @dataclass(frozen=True)
 class Derivation(Question):
     """A question whose answer is a derivation; its key is a right one.
@@ -121,7 +110,7 @@ class Derivation(Question):
 
     posed: Callable[[Exercise], Posed] = field(kw_only=True)
 
-    def judge(self, exercise: Exercise, text: str) -> Judged:
+    def judge(self, exercise: Exercise, text: str) -> Result:
         """Check the text.
 
         Raises
@@ -131,39 +120,35 @@ class Derivation(Question):
         """
         posed = self.posed(exercise)
         report, chain = _read(posed, text)
-        slip = next(
-            (
-                verdict
-                for verdict in report.verdicts
-                if verdict.status in (DIFFERS, UNREADABLE, UNDECIDED)
-            ),
-            None,
-        )
+        faults = (DIFFERS, UNREADABLE, UNDECIDED)
+        slip = next((verdict for verdict in report.verdicts if verdict.status in faults), None)
         right, steps = _counted(report, posed.name)
-        tree = _last(chain)
         if not right and slip is not None and slip.status != DIFFERS:
             raise Unusable(f"{_place(slip)}: {_words(slip)}")
-        open_end = _open(posed, tree)
+        open_end = _open(posed, chain.end)
         earned, wrong = min(right, COUNTED), steps - right
         share = earned / (earned + max(wrong, 1)) * (0.5 if open_end else 1.0)
         if slip is not None:
-            return Judged(
-                WRONG, _says(report, slip, right, steps), slip.kinds or (slip.status,), share
-            )
+            kinds = slip.kinds or (slip.status,)
+            return self._wrong(_says(report, slip, right, steps), kinds, share)
         if open_end:
             so_far = (
                 f"right so far, {steps} of {steps} steps. " if steps else "nothing is derived yet. "
             )
-            return Judged(WRONG, so_far + open_end, ("open-end",), share)
-        if tree is None or not _is(posed, tree):
+            return self._wrong(so_far + open_end, ("open-end",), share)
+        if chain.end is None or not _is(posed, chain.end):
             says = (
                 f"each line follows from the one above it, but the end is not {posed.name}: a "
                 f"name was given another meaning."
             )
-            return Judged(WRONG, says, ("other-meaning",), 0.0)
+            return self._wrong(says, ("other-meaning",), 0.0)
         if shown := _not_shown(posed, chain):
-            return Judged(WRONG, f"the end is right. {shown}", ("steps-missing",), 1 / posed.fewest)
-        return Judged(PASSED, "right", share=1.0)
+            says = f"the end is right. {shown}"
+            return self._wrong(says, ("steps-missing",), 1 / posed.fewest)
+        return Result(self.name, self.title, PASSED, "right", share=1.0)
+
+    def _wrong(self, says: str, diagnosis: tuple[str, ...], share: float) -> Result:
+        return Result(self.name, self.title, WRONG, says, diagnosis, share)
 
 
 def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
@@ -204,17 +189,6 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
     return report, chains[0]
 
 
-def _tree(text: str) -> Node | None:
-    try:
-        return read_line(text)
-    except FormulaError:
-        return None
-
-
-def _last(chain: Derived) -> Node | None:
-    return _tree(chain.verdicts[-1].text) if chain.verdicts else None
-
-
 def _counted(report: Report, name: str) -> tuple[int, int]:
     """Right steps, and all; a line that repeats the one above it is no step, nor is one that still
     has the name in it."""
@@ -223,14 +197,10 @@ def _counted(report: Report, name: str) -> tuple[int, int]:
         above = ""
         for verdict in chain.verdicts:
             same, above = verdict.text == above, verdict.text
-            if (
-                verdict.status == BEGINS
-                or same
-                or ((tree := _tree(verdict.text)) is not None and name in letters(tree))
-            ):
-                continue
-            steps += 1
-            right += verdict.status in (RIGHT, FOLLOWS, AGAIN)
+            named = verdict.tree is not None and name in letters(verdict.tree)
+            if verdict.status != BEGINS and not same and not named:
+                steps += 1
+                right += verdict.status in (RIGHT, FOLLOWS, AGAIN)
     return right, steps
 
 
@@ -238,7 +208,7 @@ def _open(posed: Posed, tree: Node | None) -> str:
     """What is still to be done after the last line; nothing if it is an end."""
     if tree is None:
         return "The last line cannot be read."
-    if any(inner.kind == MEAN for _, inner in walk(tree)):
+    if has_mean(tree):
         return "In the last line a mean is still to be taken: go on until none is left."
     left = sorted(letters(tree) - posed.ends)
     if left:
@@ -258,8 +228,8 @@ def _is(posed: Posed, tree: Node) -> bool:
 
 
 def _not_shown(posed: Posed, chain: Derived) -> str:
-    trees = [tree for verdict in chain.verdicts if (tree := _tree(verdict.text)) is not None]
-    if posed.averages and not any(inner.kind == MEAN for tree in trees for _, inner in walk(tree)):
+    trees = [verdict.tree for verdict in chain.verdicts if verdict.tree is not None]
+    if posed.averages and not any(map(has_mean, trees)):
         return "But a derivation is asked for: begin with a mean M[...], and take a step a line."
     if len({written(tree) for tree in trees}) < posed.fewest:
         return (

@@ -10,22 +10,19 @@ from __future__ import annotations
 
 import copy
 import traceback
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import sympy as sp
 
 import kfcourse
 from kfcourse.exercises.checks.derived import Derivation
-from kfcourse.exercises.checks.diagnosis import GENERAL, Wrong, part_of
+from kfcourse.exercises.checks.diagnosis import GENERAL, Wrong
 from kfcourse.exercises.checks.editing import rebound, uses
-from kfcourse.exercises.checks.equality import Places, Unusable, equal, like, with_values
-from kfcourse.exercises.checks.hints import Agree
+from kfcourse.exercises.checks.equality import Unusable, like
 from kfcourse.exercises.checks.question import (
     MISSING,
     NOT_CHECKED,
@@ -35,10 +32,10 @@ from kfcourse.exercises.checks.question import (
     Answer,
     Attempts,
     ForVariant,
-    Mistake,
     Question,
     Result,
 )
+from kfcourse.exercises.checks.reference import Posed, given_by, posed, standard
 from kfcourse.exercises.checks.registry import folders
 from kfcourse.limits import OutOfTime, time_limit
 
@@ -187,63 +184,6 @@ def _trouble(error: Exception) -> str:
     return f"{in_a_line(error)} ({' < '.join(reversed(frames[-4:]))})"
 
 
-def posed(question: Question, exercise: Exercise) -> Posed:
-    """The question as it is posed in an exercise, which keeps it: answers are compared with the
-    same again and again."""
-    return exercise.posed.setdefault(question, Posed(question, exercise))
-
-
-@dataclass(frozen=True)
-class Posed:
-    """What is asked, and what our own answers give."""
-
-    question: Question
-    exercise: Exercise
-
-    @cached_property
-    def arguments(self) -> list[tuple]:
-        return list(self.question.arguments(self.exercise))
-
-    @cached_property
-    def key(self) -> Answer:
-        return self.question.answer(self.exercise)
-
-    @cached_property
-    def expected(self) -> list[Any]:
-        if isinstance(self.question, Derivation):
-            return [""]  # a text: what it should say follows from its own lines
-        return _reference(self.key, self.arguments)
-
-    @cached_property
-    def known(self) -> list[tuple[Mistake, list[Any] | None]]:
-        """Mistakes with their results, None where impossible."""
-        return [
-            (mistake, _wrong(mistake, self.exercise, self.arguments, self.expected))
-            for mistake in self.question.mistakes
-        ]
-
-    @cached_property
-    def values(self) -> dict[sp.Symbol, Any]:
-        """Of the parameters: of the model's symbols that are no arguments of the answer."""
-        given = {
-            s.name
-            for values in self.arguments
-            for v in values
-            if hasattr(v, "free_symbols")
-            for s in v.free_symbols
-        }
-        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
-
-    @cached_property
-    def agree(self) -> Agree:
-        return partial(
-            _agree,
-            values=self.values,
-            tolerance=self.question.tolerance,
-            places=self.exercise.places,
-        )
-
-
 @dataclass(frozen=True)
 class _Check:
     """An answer to a question."""
@@ -301,64 +241,27 @@ class _Check:
             return self._says(
                 UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
             )
-        message = judged.message
-        if judged.status == PASSED:
+        if judged.passed:
             self.past.given.pop(question.name, None)
         elif self._times(answered) and question.advice:
-            message += f" {question.advice}"
-        return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
-
-    def _numbers(self, answered: list[Any]) -> bool:
-        """Whether all formulas that are wrong lack parameters, and are right with numbers in their
-        place."""
-        pairs = zip(_flat(answered), _flat(self.posed.expected), strict=True)
-        wrong = [pair for pair in pairs if not self.posed.agree(*([side] for side in pair))]
-        names = {s.name for s in self.posed.values}
-        return bool(wrong) and all(
-            names & {s.name for s in right.free_symbols} - {s.name for s in mine.free_symbols}
-            and self.posed.agree(
-                *([with_values(side, self.posed.values)] for side in (mine, right))
-            )
-            for mine, right in wrong
-        )
+            return replace(judged, message=f"{judged.message} {question.advice}")
+        return judged
 
     def _wrong(self, answered: list[Any]) -> Result:
-        pairs = [
-            (part_of(answered, place), part_of(self.posed.expected, place))
-            for place in range(len(self.question.parts))
-        ]
-        right = [1 for mine, theirs in pairs if self.posed.agree(mine, theirs)]
-        share = len(right) / len(self.question.parts) if right else 0.0
-        times = self._times(answered)
-        follows = self._follows(answered)
+        times, follows = self._times(answered), self._follows(answered)
+        wrong = Wrong(self.posed, self.answer, answered)
+        share = sum(wrong.right) / len(wrong.right) if wrong.right else 0.0
         if follows:
             says = (
                 f"this step is right on top of your {' and '.join(follows)}; what is not right "
                 f"yet is there: look there first."
             )
             return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
-        if self._numbers(answered):
-            return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
-        posed = self.posed
-        answers = posed.key, self.answer
-        wrong = Wrong(
-            self.question,
-            answers,
-            posed.arguments,
-            answered,
-            posed.expected,
-            posed.known,
-            posed.agree,
-        )
         message, names, explained = wrong.description()
-        more = [] if explained else [wrong.case(self.posed.values)]
-        if times and self.question.advice:
-            more.insert(0, self.question.advice)
-        if times > (1 if self.question.advice else 0) and explained:
-            more.append(wrong.case(self.posed.values))
-        return self._says(
-            WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share
-        )
+        advice = self.question.advice if times else ""
+        example = not explained or times > bool(self.question.advice)
+        message = " ".join(filter(None, [message, advice, wrong.example() if example else ""]))
+        return self._says(WRONG, message, diagnosis=tuple(names), share=share)
 
     def _times(self, answered: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""
@@ -384,12 +287,7 @@ class _Check:
                 answers = {function: self._in_form(earlier[function]) for function in chosen}
                 step = rebound(own_step, answers)
                 with time_limit(self.seconds):
-                    theirs = [
-                        like(step(*copy.deepcopy(values)), wanted)
-                        for values, wanted in zip(
-                            self.posed.arguments, self.posed.expected, strict=True
-                        )
-                    ]
+                    theirs = self.posed.in_form(step)
                     if self.posed.agree(answered, theirs):
                         return tuple(earlier[function].name for function in chosen)
             except (Exception, OutOfTime):  # of the earlier answer
@@ -400,63 +298,9 @@ class _Check:
         """A wrong answer to an earlier question with results in the form of the key's, as our own
         functions take them."""
         key, wrong = question.answer(self.exercise), self.past.wrong[question.name]
-        return lambda *values: like(
-            wrong(*copy.deepcopy(values)), standard(key(*copy.deepcopy(values)))
-        )
 
+        def in_form(*values: Any) -> Any:
+            (mine,), (ours,) = (given_by(answer, [values]) for answer in (wrong, key))
+            return like(mine, standard(ours))
 
-def _flat(result: Any) -> list[sp.Expr]:
-    """All formulas of a result, or of several; none of numbers."""
-    if isinstance(result, list | tuple | sp.MatrixBase):
-        return [formula for part in result for formula in _flat(part)]
-    return [result] if isinstance(result, sp.Basic) else []
-
-
-def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
-    """Results of an answer of ours, in a form that others are compared with."""
-    return [standard(answer(*copy.deepcopy(values))) for values in arguments]
-
-
-def standard(value: Any) -> Any:
-    """A result in the form in which results are compared: formulas, arrays of floats, texts, and
-    tuples of them."""
-    if isinstance(value, tuple | list):
-        return tuple(standard(part) for part in value)
-    return (
-        value
-        if isinstance(value, sp.Basic | sp.MatrixBase | str)
-        else np.asarray(value, dtype=float)
-    )
-
-
-def _agree(
-    answered: Sequence[Any],
-    expected: Sequence[Any],
-    values: Mapping[sp.Symbol, Any],
-    tolerance: float,
-    places: Places = (),
-) -> bool:
-    return all(
-        equal(a, b, tolerance, values, places) for a, b in zip(answered, expected, strict=True)
-    )
-
-
-def _wrong(
-    mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], expected: Sequence[Any]
-) -> list[Any] | None:
-    """Results of a known wrong answer; None if this variant does not allow the mistake."""
-    try:
-        wrong = mistake.answer(exercise)
-        return [
-            like(wrong(*copy.deepcopy(values)), wanted)
-            for values, wanted in zip(arguments, expected, strict=True)
-        ]
-    # of shapes, mostly; a test makes sure that each mistake is known where it is possible
-    except Exception:
-        return None
-
-
-NUMBERS = (
-    "Right in numbers, but the parameters are asked for as symbols: type their letters "
-    "where their values stand."
-)
+        return in_form

@@ -8,7 +8,7 @@ as 2*np.pi or (1/3)*x, to their digits.
 from __future__ import annotations
 
 import random
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -212,8 +212,8 @@ def equal_formulas(
     return True
 
 
-def depends(formula: sp.Expr, names: Container[str]) -> list[str]:
-    """Names of the symbols, among these, on whose values a formula depends."""
+def depends(formula: sp.Expr) -> set[str]:
+    """Names of the symbols on whose values a formula depends."""
 
     def changes(s: sp.Symbol) -> bool:  # the root of a square feels the sign alone
         return any(
@@ -221,7 +221,7 @@ def depends(formula: sp.Expr, names: Container[str]) -> list[str]:
             for other in (s + 1, -s)
         )
 
-    return sorted(s.name for s in formula.free_symbols if s.name in names and changes(s))
+    return {s.name for s in formula.free_symbols if changes(s)}
 
 
 def with_values(formula: sp.Expr, values: Mapping[sp.Symbol, Any]) -> sp.Expr:

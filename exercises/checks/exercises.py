@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.exercises.checks.engine import Posed, check
+from kfcourse.exercises.checks.engine import check
 from kfcourse.exercises.checks.question import Attempts, Question, Result
+from kfcourse.exercises.checks.reference import Posed
 from kfcourse.exercises.checks.registry import sets
 from kfcourse.exercises.checks.steps import (
     array_functions,

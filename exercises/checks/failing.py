@@ -5,91 +5,71 @@ A student who no hint helps can go through this case by hand, or in a cell of th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.symbolic.formula import symbol
+from kfcourse.exercises.checks.reference import Posed
 
 NUMBERS = 9  # that are shown of one array
 DECIMALS = (1.3, 0.7, 2.1, 0.4, 1.7, 0.9, 2.6, 0.6)  # values of symbols that have none
 
 
-def shown(
-    names: Sequence[str],
-    arguments: Sequence[Any],
-    answered: Any,
-    expected: Any,
-    part: str = "",
-    axes: Sequence[str] = (),
-    values: Mapping[sp.Symbol, Any] | None = None,
-) -> str:
-    """A sentence: for these arguments the answer gives this.
+def shown(posed: Posed, call: int, answered: Any, expected: Any, part: str) -> str:
+    """A sentence: for the arguments of this call the answer, or the part of it that is called so,
+    gives this.
 
-    Parameters
-    ----------
-    names, arguments : sequences
-        Of the call.
-    answered, expected : formula, matrix or array
-        The result, or the part of it, that is wrong there.  Of the expected one only the place
-        where they differ is used.
-    part : str
-        What this part of the result is called.
-    axes : sequence of str
-        What the leading axes of the result are.
-    values : dict, optional
-        Of the parameters.
+    Of what is expected only the place where they differ is used.
     """
-    if isinstance(expected, sp.Basic | sp.MatrixBase):
-        return _formula(arguments, answered, part, values or {})
-    return _array(names, arguments, np.asarray(answered), np.asarray(expected), part, axes)
-
-
-def _formula(
-    arguments: Sequence[Any], answered: Any, part: str, values: Mapping[sp.Symbol, Any]
-) -> str:
-    known = {symbol(s.name): value for s, value in values.items()}
-    symbols = {
-        s for expression in (*arguments, answered) for s in getattr(expression, "free_symbols", ())
-    }
-    point = {
-        s: sp.Float(known.get(symbol(s.name), DECIMALS[i % len(DECIMALS)]), 6)
-        for i, s in enumerate(sorted(symbols, key=lambda s: (symbol(s.name) in known, str(s))))
-    }
-    entries = list(answered) if isinstance(answered, sp.MatrixBase) else [answered]
-    numbers = [sp.N(entry.xreplace(point), 8) for entry in entries]
-    if not all(number.is_real for number in numbers):
+    if isinstance(expected, np.ndarray):
+        where, value = _of_array(posed, call, answered, expected)
+    else:
+        where, value = _of_formula(posed, call, answered)
+    if value is None:
         return ""
-    shape = answered.shape if isinstance(answered, sp.MatrixBase) else ()
-    result = np.array([float(number) for number in numbers]).reshape(shape)
+    yours = f"result {part} is" if part else "function gives"
+    return f"An example{where} your {yours} {_numbers(value)}."
+
+
+def _of_formula(posed: Posed, call: int, answered: Any) -> tuple[str, np.ndarray | None]:
+    """Numbers for the symbols, and the value there; None if it is not real."""
+    known = {s.name: value for s, value in posed.values.items()}
+    symbols = {
+        s for e in (*posed.arguments[call], answered) for s in getattr(e, "free_symbols", ())
+    }
+    ordered = sorted(symbols, key=lambda s: (s.name in known, s.name))
+    point = {
+        s: sp.Float(known.get(s.name, DECIMALS[i % len(DECIMALS)]), 6)
+        for i, s in enumerate(ordered)
+    }
+    entries = np.array(answered, dtype=object)
+    numbers = [sp.N(entry.xreplace(point), 8) for entry in entries.ravel()]
     where = ", ".join(f"{s} = {float(value):.4g}" for s, value in point.items())
-    return f"An example: at {where} {_yours(part, result)}."
+    if not all(number.is_real for number in numbers):
+        return "", None
+    return f": at {where}", np.array(numbers, dtype=float).reshape(entries.shape)
 
 
-def _array(
-    names: Sequence[str],
-    arguments: Sequence[Any],
-    answered: np.ndarray,
-    expected: np.ndarray,
-    part: str,
-    axes: Sequence[str],
-) -> str:
+def _of_array(
+    posed: Posed, call: int, answered: np.ndarray, expected: np.ndarray
+) -> tuple[str, np.ndarray | None]:
+    """The first place that is wrong, with the arguments there, and the value."""
+    axes, tolerance = posed.question.axes, posed.question.tolerance
     place: tuple[int, ...] = ()
     if axes and answered.ndim >= len(axes):
         scale = np.max(np.abs(expected[np.isfinite(expected)]), initial=0.0)
-        wrong = ~np.isclose(answered, expected, rtol=1e-6, atol=1e-6 * scale, equal_nan=True)
-        first = np.argwhere(wrong)[0] if wrong.any() else np.zeros(answered.ndim, int)
-        place = tuple(int(i) for i in first[: len(axes)])
-        answered = answered[place]
+        near = np.isclose(
+            answered, expected, rtol=tolerance, atol=tolerance * scale, equal_nan=True
+        )
+        place = tuple(np.argwhere(~near)[0, : len(axes)].tolist())
     sizes = expected.shape[: len(place)]
     inputs = []
-    for name, value in zip(names, arguments, strict=False):
+    for name, value in zip(posed.names, posed.arguments[call], strict=True):
         if callable(value):
             continue
         array = np.asarray(value, dtype=float)
-        if place and len(sizes) > 1 and array.shape[: len(sizes)] == sizes:
+        if len(place) > 1 and array.shape[: len(sizes)] == sizes:
             array = array[: place[0] + 1, place[1]]  # of this trajectory, up to this step
         elif place and array.ndim and array.shape[:1] == sizes[:1]:
             # what is found of a row may need its neighbours, as an interval does
@@ -99,15 +79,9 @@ def _array(
             else:
                 array = array[place[0]]
         inputs.append(f"{name} = {_numbers(array)}")
-    where = "".join(f", {axis} {i}" for axis, i in zip(axes, place, strict=False))
-    return (
-        f"An example{where}{' (counted from 0)' if where else ''}: for {', '.join(inputs)} "
-        f"{_yours(part, answered)}."
-    )
-
-
-def _yours(part: str, value: np.ndarray) -> str:
-    return f"your {f'result {part} is' if part else 'function gives'} {_numbers(value)}"
+    counted = "".join(f", {axis} {i}" for axis, i in zip(axes, place, strict=False))
+    counted += " (counted from 0)" * bool(counted)
+    return f"{counted}: for {', '.join(inputs)}", answered[place]
 
 
 def _numbers(array: np.ndarray) -> str:

@@ -4,6 +4,7 @@ told apart."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -87,47 +88,38 @@ def _taken(steps: Sequence[int], k: int) -> int:
     return steps[k % len(steps)] if steps else k
 
 
-def telling_steps(model: Model) -> list[int]:
-    """Steps at which the equations differ, in the order of time; where an input or a switch rests,
-    a wrong step does not show."""
+def _values(model: Model) -> list[tuple[str, ...]]:
+    """What the equations give at every step, at the same place."""
     state, meter = compile_model(model)
     x = model.prior.mean + np.sqrt(np.diagonal(model.prior.cov))
     v, w = (law.mean + 1.0 for law in (model.state_noise, model.meter_noise))
-    first: dict[tuple[str, ...], int] = {}
     with np.errstate(all="ignore"):
-        for k in range(int(min(TRIED, model.known.steps))):
-            first.setdefault(
-                tuple(f"{value:.9g}" for value in (*state(x, v, k), *meter(x, w, k))), k
-            )
+        return [
+            tuple(f"{value:.9g}" for value in (*state(x, v, k), *meter(x, w, k)))
+            for k in range(int(min(TRIED, model.known.steps)))
+        ]
+
+
+def telling_steps(model: Model) -> list[int]:
+    """Steps at which the equations differ, in the order of time; where an input or a switch rests,
+    a wrong step does not show."""
+    first: dict[tuple[str, ...], int] = {}
+    for k, values in enumerate(_values(model)):
+        first.setdefault(values, k)
     return list(first.values())
 
 
 def places(model: Model) -> list[Mapping[sp.Symbol, sp.Expr]]:
     """Values of k and t at which formulas are compared: on both sides of every switch; none if
     there is no switch."""
-    interval, clocks = (
-        model.known.interval,
-        [s for s in model.known.symbols if s.name not in model.known.inputs],
-    )
-    equations = sp.Matrix([*model.state_equation, *model.meter_equation]).subs(model.values)
-    borders = [
-        relation.lhs - relation.rhs for relation in equations.atoms(sp.core.relational.Relational)
-    ]
-    borders += [call.args[0] for call in equations.atoms(sp.Heaviside, sp.sign, sp.Abs)]
+    equations = sp.Matrix([*model.state_equation, *model.meter_equation])
+    if not equations.has(sp.core.relational.Relational, sp.Heaviside, sp.sign, sp.Abs):
+        return []
+    clocks = [s for s in model.known.symbols if s.name not in model.known.inputs]
     steps = set[int]()
-    for border in borders:
-        for clock, length in ((s, interval if s.name == "t" else sp.S.One) for s in clocks):
-            if border.free_symbols == {clock}:
-                at = [sp.floor(root / length) for root in _roots(border, clock)]
-                steps |= {int(k) + d for k in at for d in (-1, 0, 1, 2) if k + d >= 0}
+    for k, (before, after) in enumerate(pairwise(_values(model))):
+        steps |= {k, k + 1, k + 2} if before != after else set()
     return [
-        {s: sp.Integer(k) * (interval if s.name == "t" else 1) for s in clocks}
+        {s: sp.Integer(k) * (model.known.interval if s.name == "t" else 1) for s in clocks}
         for k in sorted(steps)
     ]
-
-
-def _roots(border: sp.Expr, clock: sp.Symbol) -> list[sp.Expr]:
-    try:
-        return [root for root in sp.solve(border, clock) if root.is_real]
-    except NotImplementedError:  # compared at random points only
-        return []

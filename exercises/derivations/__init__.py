@@ -3,8 +3,7 @@
 terms     the tree of a line as it was typed: nothing is simplified, so that its terms can be named
 typed     text -> tree, read without running it
 setting   what letters mean: the law of the state, noises, the structural functions of a model
-values    a tree at random points; means by Gauss-Hermite quadrature
-compared  are two lines equal?
+values    a tree at random points, means by Gauss-Hermite quadrature; are two lines equal?
 slips     which single change of a line makes it equal to the one above?
 wording   what is said of a slip, and which rule the right step uses
 chains    the text of a whole derivation: its headings, its chains of lines

@@ -22,6 +22,7 @@ from kfcourse.exercises.derivations.typed import tree_of
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.sides import Side, taylor
 
 KINDS = ("gaussian", "linearised")
 OF_FILTERS = (
@@ -215,29 +216,15 @@ def _moments(first: str, second: str, equations: list[Node], taken: set[str]) ->
 
 def _linearised(model: Model, law: Law) -> dict[str, Node]:
     """The equations and their slopes at the mean, and A p A^T + B B^T."""
-    at_mean = dict(zip(model.x, map(symbol, law.means), strict=True)) | {
-        s: sp.S.Zero for s in (*model.v, *model.w)
-    }
-    cov = sp.Matrix(len(law.states), len(law.states), lambda i, j: symbol(law.cov[i][j]))
+    own_mean = sp.ImmutableMatrix([symbol(name) for name in law.means])
+    own_cov = sp.ImmutableMatrix([[symbol(name) for name in row] for row in law.cov])
     meanings: dict[str, sp.Expr] = {}
-    for first, second, equation, noise in (
-        ("tau", "Theta", model.state_equation, model.v),
-        ("h", "F", model.meter_equation, model.w),
-    ):
-        A, B = (
-            equation.jacobian(sp.Matrix(variables)).subs(at_mean, simultaneous=True)
-            for variables in (model.x, noise)
-        )
-        values, size = equation.subs(at_mean, simultaneous=True), equation.rows
-        covariance = A * cov * A.T + B * B.T
-        meanings |= {first if size == 1 else f"{first}{i + 1}": values[i] for i in range(size)}
-        meanings |= {
-            _entry(second, i, j, size, size): covariance[i, j]
-            for i in range(size)
-            for j in range(size)
-        }
-        if first == "h":
-            meanings |= {
-                _entry("G", i, j, *A.shape): A[i, j] for i in range(A.rows) for j in range(A.cols)
-            }
+    for first, second, which in (("tau", "Theta", "object"), ("h", "F", "meter")):
+        side = replace(Side.of(model, which), mean=own_mean, cov=own_cov)
+        value, slope, covariance, _ = taylor(side)
+        for name, matrix in ((second, covariance), *([("G", slope)] if first == "h" else [])):
+            for i, j in np.ndindex(*matrix.shape):
+                meanings[_entry(name, i, j, *matrix.shape)] = matrix[i, j]
+        for i, entry in enumerate(value):
+            meanings[first if len(value) == 1 else f"{first}{i + 1}"] = entry
     return {name: tree_of(formula) for name, formula in meanings.items()}

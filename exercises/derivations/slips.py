@@ -4,7 +4,6 @@ Changes are tried, one node of the line at a time: the sign of a term, a number 
 letter for another one, a factor or a term lost or too much, a moment of the normal law for another
 one.  So are changes of the line above: what of it would give this line?  Values at a few random
 points choose; the line with the change must then be equal to the one above, as lines are compared.
-What a sum lacks is found as q c, c of letters, from its values.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from kfcourse.exercises.derivations.compared import EQUAL, compare
 from kfcourse.exercises.derivations.setting import Setting
 from kfcourse.exercises.derivations.terms import (
     CALL,
@@ -44,11 +42,12 @@ from kfcourse.exercises.derivations.terms import (
     walk,
     written,
 )
-from kfcourse.exercises.derivations.values import ENTIRE, Uncomputed, Values
+from kfcourse.exercises.derivations.values import ENTIRE, EQUAL, Uncomputed, Values, compare
 from kfcourse.laws import Array
 
 CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly
 MOST_TRIED = 30000  # changes
+FORGOTTEN = "noise-forgotten"
 COSTS = {  # what is named if several changes explain a line
     "sign": 1.0,
     "doubled": 1.05,
@@ -56,11 +55,9 @@ COSTS = {  # what is named if several changes explain a line
     "moment": 1.25,
     "power": 1.2,
     "factor": 1.2,
-    "noise-forgotten": 1.22,
-    "noise-mean": 1.45,
+    FORGOTTEN: 1.22,
     "lost-factor": 1.3,
     "extra": 1.4,
-    "function": 1.4,
     "lost": 1.5,
 }
 NUMBERS = [  # in front of a term
@@ -68,7 +65,6 @@ NUMBERS = [  # in front of a term
     *(Fraction(p, q) for q in range(1, 7) for p in range(1, 7) if p != q and gcd(p, q) == 1),
 ]
 POWERS = (1, 2, 3, 4, Fraction(1, 2), -1, -2)
-PROBES = Fraction(17, 60), Fraction(71, 60), Fraction(-49, 60)  # values of a node
 OF_THE_LINE_ABOVE = 1.0  # an addition to the cost
 
 
@@ -83,7 +79,7 @@ class Slip:
     path : tuple of int
         Way from the root to what is changed, in the line; to the term of the line above if `above`.
     name : str
-        The letter, the function or the noise concerned.
+        The letter or the noise concerned.
     order : int
         Of the moment.
     lost : Node, optional
@@ -141,12 +137,9 @@ class _Search:
                 if name in self.setting.meanings:
                     waiting.append(self.setting.meanings[name])
         self.pool = sorted(free)
-        self.letters = [name for name in self.pool if name not in self.setting.meanings]
         both = [self.line, self.above]
         self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
         self.mine, self.theirs = (self.values.of(tree, keep=True) for tree in both)
-        logs = [np.log(np.abs(self.values.letter(name))) for name in self.letters]
-        self.inverse = np.linalg.pinv(np.array([np.ones(self.values.points), *logs]).T)
         self.terms = [
             (sign, term)
             for _, node in walk(self.above)
@@ -168,7 +161,7 @@ class _Search:
             # around a term that is named already
             if any(self._place(other)[: len(place)] == place for _, other in kept):
                 continue
-            if self._equal(tree, self.line if slip.above or _of_noise(slip) else self.above):
+            if self._equal(tree, self.line if slip.above or slip.kind == FORGOTTEN else self.above):
                 kept.append((cost, slip))
         slips = [slip for _, slip in kept]
         if slips and slips[0].kind == "doubled":  # either of the two
@@ -181,69 +174,67 @@ class _Search:
     def fitting(self) -> Iterator[tuple[float, Slip, Node]]:
         """Changes that give the right values: cost, slip, the changed tree."""
         for name in [noise for noise in self.setting.law.noises if noise in letters(self.above)]:
-            for kind, value in (("noise-forgotten", 0), ("noise-mean", 1)):
-                tree = replaced(self.above, {name: number(value)})
-                if self._same(self.values.of(tree), self.mine):
-                    yield COSTS[kind], Slip(kind, (), name), tree
+            tree = replaced(self.above, {name: number(0)})
+            if self._same(self.values.of(tree), self.mine):
+                yield COSTS[FORGOTTEN], Slip(FORGOTTEN, (), name), tree
         moments, count = list(self._moments()), 0
         for wrong, right, _ in moments:
             self.values.of(product(wrong, right), keep=True)
         for root, other in ((self.line, False), (self.above, True)):
             target = self.mine if other else self.theirs
             for path, node in walk(root):
-                around = [at(root, path[:i]) for i in range(len(path))]
-                wanted = self._wanted(root, path, around, target)
-                changes = self._of_moments(path, node, around, moments, other)
+                outer = at(root, path[:-1]) if path else None
+                changes = self._of_moments(path, node, outer, moments, other)
                 if not other:
-                    changes = chain(changes, self._of_node(path, node, around, wanted))
+                    changes = chain(changes, self._of_node(path, node, outer))
                 for cost, slip, new in changes:
                     count += 1
                     if count > MOST_TRIED:
                         return
-                    changed_, its = (
-                        (changed(root, path, new), target) if wanted is None else (new, wanted)
-                    )
-                    if self._same(self.values.of(changed_), its):
-                        tree = changed(root, path, new)
-                        if not self._nothing(tree, path, around, slip.kind):
-                            yield cost, slip, tree
+                    tree = changed(root, path, new)
+                    if self._same(self.values.of(tree), target) and not self._nothing(
+                        tree, path, slip.kind
+                    ):
+                        yield cost, slip, tree
+        yield from self._lost()
 
-    def _nothing(self, tree: Node, path: Path, around: list[Node], kind: str) -> bool:
+    def _nothing(self, tree: Node, path: Path, kind: str) -> bool:
         """Whether a change leaves nothing of the mean or the power around it: then that does not
         belong there as a whole.
 
         With a noise that was lost a mean may be zero, and rightly so.
         """
-        for i, outer_ in enumerate(around):
-            if outer_.kind in (MEAN, CALL, POWER):
-                outer = at(tree, path[:i])
+        for i in range(len(path)):
+            outer = at(tree, path[:i])
+            if outer.kind in (MEAN, CALL, POWER):
                 left = self.values.of(outer.parts[0] if kind == "lost-factor" else outer)
                 return bool(np.all(np.abs(left) <= 1e-9))
         return False
 
-    def _wanted(self, root: Node, path: Path, around: list[Node], target: Array) -> Array | None:
-        """What the value of a node should be; None inside a power, a function or a mean.
-
-        Outside of them the line is (a + b t)/(c + d t), t the value: four of such values have one
-        cross-ratio with those of t.
-        """
-        if any(outer.kind not in (SUM, PRODUCT) for outer in around):
-            return None
-        p, q, r = PROBES
-        first, second, third = (
-            self.values.of(changed(root, path, number(probe))) for probe in PROBES
-        )
+    def _lost(self) -> Iterator[tuple[float, Slip, Node]]:
+        """What the line lacks, if that is a number times powers of letters."""
+        names = [name for name in self.pool if name not in self.setting.meanings]
+        values, factors = self.theirs - self.mine, list[Node]()
         with np.errstate(all="ignore"):
-            ratio = (target - first) * (second - third) / (target - third) / (second - first)
-            ratio = ratio * float((q - p) / (q - r))
-            wanted = (float(p) - ratio * float(r)) / (1 - ratio)
-        return wanted if np.isfinite(wanted).all() else None
+            logs = [np.log(np.abs(self.values.letter(name))) for name in names]
+            inverse = np.linalg.pinv(np.array([np.ones(self.values.points), *logs]).T)
+            exponents = np.round(inverse @ np.log(np.abs(values)))[1:]
+            if not np.abs(exponents).max(initial=0) <= 12:  # also of what has no value
+                return
+            powers = {name: int(k) for name, k in zip(names, exponents, strict=True) if k}
+            for name, k in powers.items():
+                values = values / self.values.letter(name) ** float(k)
+                factors.append(power(letter(name), k))
+        q = number(Fraction(float(np.median(values))).limit_denominator(60))
+        tree = total(self.line, product(q, *factors))
+        if self._same(self.values.of(tree), self.theirs):
+            yield COSTS["lost"], Slip("lost", (), " and ".join(powers)), tree
 
     def _of_moments(
-        self, path: Path, node: Node, around: list[Node], moments: list[Any], other: bool
+        self, path: Path, node: Node, outer: Node | None, moments: list[Any], other: bool
     ) -> Iterator[tuple[float, Slip, Node]]:
         """A moment in the place of another; of the line above, the other way round."""
-        if not around or around[-1].kind in (SUM, POWER):
+        if outer is None or outer.kind in (SUM, POWER):
             for wrong, right, order in moments:
                 pair = (wrong, right) if other else (right, wrong)
                 slip = Slip("moment", path, order=order, above=other)
@@ -251,12 +242,10 @@ class _Search:
                 yield cost, slip, product(node, *pair, exponents=(1, 1, -1))
 
     def _of_node(
-        self, path: Path, node: Node, around: list[Node], wanted: Array | None
+        self, path: Path, node: Node, outer: Node | None
     ) -> Iterator[tuple[float, Slip, Node]]:
         """Changes of one node of the line: cost, slip, the new node."""
         parts, data = node.parts, node.data
-        outer = around[-1].kind if around else ""
-        beside = bool(around) and len(around[-1].parts) > 1
 
         def slip(
             kind: str,
@@ -286,45 +275,24 @@ class _Search:
         if base.kind != NUMBER:
             name = base.data if base.kind == LETTER else ""
             yield from (slip("power", power(base, k), name) for k in POWERS if k != own)
-        if node.kind == CALL:
-            yield from (slip("function", Node(CALL, parts, name), data) for name in ENTIRE)
         if node.kind == PRODUCT:
             for i, part in enumerate(parts):
                 name = part.data if part.kind == LETTER else ""
                 rest = Node(PRODUCT, (*parts[:i], number(1), *parts[i + 1 :]), data)
                 yield slip("extra", rest, name, below=(i,))
-        if outer != PRODUCT:
+        if outer is None or outer.kind != PRODUCT:
+            beside = outer is not None and len(outer.parts) > 1
             for q in NUMBERS:
                 kind, new = "sign" if q == -1 else "factor", product(number(q), node)
                 yield slip(kind, new, more=0.35 * (node.kind == LETTER and beside))
             for name in self.pool:
                 for k in (1, 2):
                     yield slip("lost-factor", product(power(letter(name), k), node), name)
-        if outer != SUM:
+        if outer is None or outer.kind != SUM:
             for _, term in self.terms:
                 for lost in (term, mean(term)):
                     for sign in (1, -1):
                         yield slip("lost", total(node, lost, signs=(1, sign)), lost=term)
-            if wanted is not None:
-                for q, powers in self._monomial(wanted - self.values.of(node)):
-                    factors = [power(letter(name), k) for name, k in powers.items()]
-                    # in the sum where least is lost
-                    more = 0.02 * sum(map(abs, powers.values())) + 0.1 * (node.kind != SUM)
-                    new = total(node, product(number(q), *factors))
-                    yield slip("lost", new, " and ".join(powers), more=more)
-
-    def _monomial(self, values: Array) -> Iterator[tuple[Fraction, dict[str, int]]]:
-        """q and powers of letters of which these may be the values."""
-        with np.errstate(all="ignore"):
-            exponents = (self.inverse @ np.log(np.abs(values)))[1:]
-            if np.abs(exponents).max(initial=0) <= 12:
-                powers = {
-                    n: int(k) for n, k in zip(self.letters, np.round(exponents), strict=True) if k
-                }
-                for name, k in powers.items():
-                    values = values / self.values.letter(name) ** float(k)
-                if q := Fraction(float(np.median(values))).limit_denominator(60):
-                    yield q, powers
 
     def _moments(self) -> Iterator[tuple[Node, Node, int]]:
         """Wrong and right moments of the normal law, and their order; of functions, too."""
@@ -372,7 +340,7 @@ class _Search:
     def _unlikely(self, slip: Slip) -> float:
         """An addition to the cost of changing a term that is nothing, or that stands in the line
         above as it is."""
-        if slip.above or _of_noise(slip) or slip.kind in ("doubled", "extra", "lost"):
+        if slip.above or slip.kind in (FORGOTTEN, "doubled", "extra", "lost"):
             return 0.0
         path = term_path(self.line, slip.path)
         value = self.values.of(at(self.line, path))
@@ -392,7 +360,3 @@ class _Search:
     def _same(self, a: Array, b: Array) -> bool:
         with np.errstate(all="ignore"):
             return bool(np.all(np.abs(a - b) <= CLOSE * (np.abs(a) + np.abs(b)) + 1e-14))
-
-
-def _of_noise(slip: Slip) -> bool:
-    return slip.kind.startswith("noise")

@@ -102,6 +102,11 @@ def letters(node: Node) -> set[str]:
     return {inner.data for _, inner in walk(node) if inner.kind == LETTER}
 
 
+def has_mean(node: Node) -> bool:
+    """Whether a mean is left to be taken in it."""
+    return any(inner.kind == MEAN for _, inner in walk(node))
+
+
 def replaced(node: Node, names: dict[str, Node]) -> Node:
     """The tree with other nodes in the place of letters."""
     if node.kind == LETTER:

@@ -1,4 +1,4 @@
-r"""A tree at random points, and its means there by Gauss-Hermite quadrature.
+r"""A tree at random points, and its means there by Gauss-Hermite quadrature; are two equal?
 
 With n nodes on an axis the mean of a polynomial is exact up to degree 2n - 1; the exponentials,
 sines and cosines of linear functions that may stand in a mean are entire, and with `FUNCTION_NODES`
@@ -248,9 +248,36 @@ def hermite(count: int) -> tuple[Array, Array]:
     return nodes, weights / weights.sum()
 
 
-def agree(first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
-    """At which points two values with their sizes are equal; where one of them has no value, they
-    are not."""
-    (a, size_a), (b, size_b) = first, second
+EQUAL, DIFFERENT, IF_POSITIVE, NO_VALUE = "equal", "different", "equal if positive", "no value"
+FEWEST = 4  # points at which both have values
+# of a value: what its rounding may be, that it can be compared; tan(1e16) has no value
+CLEAR = 1e-4
+
+
+def compare(setting: Setting, first: Node, second: Node) -> str:
+    """Whether two trees are equal: "equal", "different", "equal if positive" letters are meant, or
+    "no value".
+
+    Raises
+    ------
+    Uncomputed
+        A mean is not computed here.
+    """
+    values = Values(setting, [first, second])
+    (a, size_a), (b, size_b) = values.sized(first), values.sized(second)
     with np.errstate(all="ignore"):
-        return np.abs(a - b) <= ROUNDING * (size_a + size_b)
+        same = np.abs(a - b) <= ROUNDING * (size_a + size_b)
+        defined = np.array(
+            [
+                np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value)))
+                for value, size in ((a, size_a), (b, size_b))
+            ]
+        )
+    positive = defined.all(axis=0) & (np.arange(values.points) < values.points / 3)
+    if positive.sum() < FEWEST:
+        return NO_VALUE
+    if not same[positive].all():
+        return DIFFERENT
+    # Where only one side has a value, as log(c^2) has and 2 log(c) has not, they are equal for
+    # positive letters only.
+    return EQUAL if same[defined.any(axis=0)].all() else IF_POSITIVE

@@ -10,11 +10,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from kfcourse.exercises.derivations.chains import Chain, FindModel, Typed, read_chains
-from kfcourse.exercises.derivations.compared import DIFFERENT, EQUAL, IF_POSITIVE, NO_VALUE, compare
 from kfcourse.exercises.derivations.setting import Law, Setting, of_side
 from kfcourse.exercises.derivations.slips import find_slips, named
-from kfcourse.exercises.derivations.terms import LETTER, MEAN, Node, at, letter, walk
-from kfcourse.exercises.derivations.values import Uncomputed
+from kfcourse.exercises.derivations.terms import LETTER, Node, at, letter, walk
+from kfcourse.exercises.derivations.values import (
+    DIFFERENT,
+    EQUAL,
+    IF_POSITIVE,
+    NO_VALUE,
+    Uncomputed,
+    compare,
+)
 from kfcourse.exercises.derivations.wording import UNEXPLAINED, described, rule
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.formula import FormulaError
@@ -55,6 +61,8 @@ class Verdict:
         Where these stand in the text; none for a term of the line above.
     rule : str
         Which the right step uses.
+    tree : Node, optional
+        If it can be read.
     """
 
     line: int
@@ -66,6 +74,7 @@ class Verdict:
     terms: tuple[str, ...] = ()
     spans: tuple[tuple[int, int], ...] = ()
     rule: str = ""
+    tree: Node | None = None
 
     def __str__(self) -> str:
         words = f"{self.line:>4} {MARKS[self.status]} {self.text}"
@@ -74,17 +83,19 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Derived:
-    """One chain: its name, if a name stands at its left; its lines; whether no mean is left at its
-    end."""
+    """One chain: its name, if a name stands at its left; its lines."""
 
     name: str
     verdicts: tuple[Verdict, ...]
-    compared: bool
-    closed: bool
 
     @property
     def right(self) -> bool:
         return all(verdict.status in (BEGINS, RIGHT) for verdict in self.verdicts)
+
+    @property
+    def end(self) -> Node | None:
+        """The last line, if it can be read."""
+        return self.verdicts[-1].tree if self.verdicts else None
 
 
 @dataclass(frozen=True)
@@ -164,35 +175,24 @@ class _Chain:
                 self.setting = self.setting.defining(letter_, tree)
         meant = name in self.setting.meanings
         previous: Node | None = letter(name) if meant else None
-        above = "" if meant or name else first.text
+        above = "" if name else first.text
         links = iter(rest if name else self.chain.links)
         self.right: Node | None = previous  # the last line that is right
         # number of the line with the first slip, after which nothing was right in itself
         broken = 0
         for link in links:
+            node = None
+            defined = name if previous is not None and not above else ""
             try:
                 with time_limit(SECONDS):
                     node = link.read(self.setting)
-                    broken = self._line(
-                        link,
-                        node,
-                        previous,
-                        above,
-                        name if previous is not None and not above else "",
-                        broken,
-                    )
+                    broken = self._line(link, node, previous, above, defined, broken)
             except FormulaError as error:
                 self._says(link, UNREADABLE, _marked(link, error))
                 continue
-            except Uncomputed as error:
-                self._says(link, UNDECIDED, str(error))
-                continue
-            except OutOfTime:
-                self._says(
-                    link,
-                    UNDECIDED,
-                    f"it cannot be compared within {SECONDS:g} s: split the step up",
-                )
+            except (Uncomputed, OutOfTime) as error:
+                late = f"it cannot be compared within {SECONDS:g} s: split the step up"
+                self._says(link, UNDECIDED, str(error) or late, node)
                 continue
             previous, above = node, link.text
         if (
@@ -202,8 +202,7 @@ class _Chain:
             and not self._comes_back(name, previous)
         ):
             self.derived[name] = self.setting.law, previous
-        closed = previous is not None and not any(inner.kind == MEAN for _, inner in walk(previous))
-        return Derived(name, tuple(self.verdicts), meant or not name, closed)
+        return Derived(name, tuple(self.verdicts))
 
     def _comes_back(self, name: str, tree: Node) -> bool:
         """Whether what stands for a name has the name in it again, as the letters mean here:
@@ -220,8 +219,11 @@ class _Chain:
             ]
         return name in seen
 
-    def _says(self, link: Typed, status: str, says: str = "", **more: Any) -> None:
-        self.verdicts.append(Verdict(link.line, link.column, link.text, status, says, **more))
+    def _says(
+        self, link: Typed, status: str, says: str = "", tree: Node | None = None, **more: Any
+    ) -> None:
+        place = link.line, link.column, link.text
+        self.verdicts.append(Verdict(*place, status, says, tree=tree, **more))
 
     def _line(
         self, link: Typed, node: Node, previous: Node | None, above: str, name: str, broken: int
@@ -229,23 +231,21 @@ class _Chain:
         """Judge one line; returns the number of the line with the slip on which it stands, or 0."""
         if previous is None:
             compare(self.setting, node, node)  # a mean that is not computed is said here
-            self._says(link, BEGINS, "nothing to compare it with: the chain is checked from here")
+            says = "nothing to compare it with: the chain is checked from here"
+            self._says(link, BEGINS, says, node)
             self.right = node
             return 0
         result = compare(self.setting, node, previous)
         if result == EQUAL:
             if not broken:
-                self._says(link, RIGHT)
+                self._says(link, RIGHT, tree=node)
                 self.right = node
             else:
-                self._says(link, FOLLOWS, f"right on top of line {broken}")
+                self._says(link, FOLLOWS, f"right on top of line {broken}", node)
             return broken
         if broken and self.right is not None and compare(self.setting, node, self.right) == EQUAL:
-            self._says(
-                link,
-                AGAIN,
-                f"right in itself: equal to what stood before the slip of line {broken}",
-            )
+            says = f"right in itself: equal to what stood before the slip of line {broken}"
+            self._says(link, AGAIN, says, node)
             return 0
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
@@ -259,7 +259,7 @@ class _Chain:
                 f"equal to {where} only for positive letters: declare them in a line of its "
                 f"own before the chain, positive ..."
             )
-            self._says(link, DIFFERS, says, kinds=("positive",))
+            self._says(link, DIFFERS, says, node, kinds=("positive",))
             return broken or link.line
         slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
         descriptions = [
@@ -276,6 +276,7 @@ class _Chain:
             link,
             DIFFERS,
             says,
+            node,
             kinds=tuple(slip.kind for slip in slips),
             terms=tuple(term for _, term in descriptions),
             spans=tuple(place for place in places if place),

@@ -87,10 +87,8 @@ def described(
         "factor": f"a number in `{term}` is not right",
         "noise-forgotten": f"the mean square of the noise {slip.name} is forgotten: its part is "
         "missing",
-        "noise-mean": f"the mean of the noise {slip.name} is not zero in this line",
         "lost-factor": f"a factor is lost from `{term}`: {slip.name}",
         "extra": f"{'something in ' if slip.name else ''}`{term}` does not belong there",
-        "function": f"in `{term}` another function belongs in the place of {slip.name}",
         "lost": f"a term is lost{_lost(slip, text_above)}, in `{term}`",
     }
     return says[slip.kind], term
@@ -128,9 +126,7 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
     kind = slip.kind if slip else ""
     lost = letters(above) - letters(line)
     noises = lost & set(setting.law.noises)
-    if kind in ("noise-forgotten", "noise-mean") or (
-        noises and kind in ("extra", "lost", "doubled", "")
-    ):
+    if kind == "noise-forgotten" or (noises and kind in ("extra", "lost", "doubled", "")):
         return RULES["noise"]
     states = set(setting.law.states)
     means, left = (

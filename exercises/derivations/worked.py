@@ -11,9 +11,11 @@ from collections.abc import Container
 from typing import NamedTuple
 
 import sympy as sp
-from sympy.printing.str import StrPrinter
+from sympy.codegen.cfunctions import expm1
 
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
+from kfcourse.exercises.derivations.terms import has_mean, written
+from kfcourse.exercises.derivations.typed import tree_of
 from kfcourse.exercises.derivations.verdicts import check_text
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.formula import symbol
@@ -46,7 +48,7 @@ def stages(
     elif name[0] == "G":
         inner = sp.diff(a, model.x[digits[-1]])
     else:
-        means = [plain(law.mean_of(part)) for part in (a, b)]
+        means = [without_expm1(law.mean_of(part)) for part in (a, b)]
         for place, i in enumerate((digits[0], digits[-1])):
             letter = ("tau" if name[0] == "T" else "h") + (f"{i + 1}" if len(side) > 1 else "")
             if letter in known:
@@ -68,13 +70,15 @@ def stages(
         of_noise, of_state = inside.as_independent(*model.x, as_Add=False)
         mean_of_noise = law.mean_of(of_noise)
         quiet += sp.factor(outside) * mean_of_noise * (1 if of_state == 1 else M(of_state))
-        closed += sp.factor(outside).subs(values) * mean_of_noise * plain(law.mean_of(of_state))
+        closed += (
+            sp.factor(outside).subs(values) * mean_of_noise * without_expm1(law.mean_of(of_state))
+        )
     return [M(inner), split, quiet, closed, sp.expand(closed)], law
 
 
-def plain(formula: sp.Expr) -> sp.Expr:
-    """The formula without NumPy's expm1."""
-    return formula.replace(lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
+def without_expm1(formula: sp.Expr) -> sp.Expr:
+    """The formula as people write it: NumPy's expm1 keeps the digits of e^u - 1 in the code."""
+    return formula.replace(expm1, lambda u: sp.exp(u) - 1)
 
 
 class Worked(NamedTuple):
@@ -99,7 +103,8 @@ def right_derivation(model: Model) -> Worked | None:
             (chain,) = check_text(text, None, setting).chains
     except (Exception, OutOfTime):  # of SymPy, at a formula that it cannot average
         return None
-    return Worked(model, name, text) if chain.right and chain.closed else None
+    closed = chain.end is not None and not has_mean(chain.end)
+    return Worked(model, name, text) if chain.right and closed else None
 
 
 def worth_deriving(model: Model) -> str:
@@ -134,7 +139,7 @@ def derive(model: Model, name: str) -> str:
     mean = sp.Matrix([symbol(entry) for entry in law.means])
     cov = sp.Matrix([[symbol(entry) for entry in row] for row in law.cov])
     formulas, _ = stages(model, name, mean, cov, setting.meanings)
-    lines = [typed(formula) for formula in formulas]
+    lines = [written(tree_of(formula)) for formula in formulas]
     remarks = [
         "",
         "# multiplied out",
@@ -163,17 +168,3 @@ def _definition(setting: Setting, name: str) -> str:
         if all(name in setting.meanings for name in needed)
         else ""
     )
-
-
-def typed(formula: sp.Expr) -> str:
-    """A formula as a student types it in a derivation: ^ for powers, M[...] for means."""
-    return str(_Printer().doprint(formula))
-
-
-class _Printer(StrPrinter):
-    def _print_Function(self, expr: sp.Function) -> str:
-        inner = self.stringify(expr.args, ", ")
-        return f"M[{inner}]" if expr.func == M else f"{expr.func.__name__}({inner})"
-
-    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
-        return super()._print_Pow(expr, rational).replace("**", "^")

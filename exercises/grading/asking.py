@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from kfcourse.exercises.checks import Exercise, Question, exercise
-from kfcourse.exercises.checks.engine import posed, standard
 from kfcourse.exercises.checks.equality import equal
+from kfcourse.exercises.checks.reference import posed, standard
 
 ULPS = 4  # by how many last digits arguments are changed
 SHARE = 0.3  # of the tolerance may come of that

@@ -117,9 +117,8 @@ def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
 def _grade(
     work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, start: Any
 ) -> Grade:
-    code = [cell for cell in cells if cell.code]
     with time_limit(WHOLE * work.seconds):
-        exercise, looks = claimed(claim, code, work.variants_file, work.variant)
+        exercise, looks = claimed(claim, work.variants_file, work.variant)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
         opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise))
     steps, own = assembled(master, cells)
@@ -275,14 +274,14 @@ class Marking:
 
 
 STRANGE = re.compile(
-    r"✓|\btask(\.\w+)?\s*=(?!=|\s*exercise\()"  # checks of one's own: here others count
+    r"✓|\btask(\.\w+)?\s*=(?!=)|\bexercise\("  # checks of one's own: here others count
     r"|kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__"
 )
 
 
 def strange_lines(own: Iterable[Cell], master: NotebookNode) -> list[str]:
     """Lines of the student's that reach for more than an exercise needs: what the package computes,
-    or a tick of one's own."""
+    another exercise, or a tick of one's own."""
     usual = {line.strip() for cell in master.cells for line in cell.source.splitlines()}
     strange = [
         clean(f"{cell.name}: {line.strip()}")

@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -211,11 +211,9 @@ def cells_of(document: Mapping[str, Any]) -> list[Cell]:
     return read
 
 
-def claimed(
-    claim: Any, cells: Sequence[Cell], variants_file: Path | None, given: str = ""
-) -> tuple[Exercise, list[str]]:
-    """The set that a notebook claims, for the variant that was given, and what to look at about
-    that.
+def claimed(claim: Any, variants_file: Path | None, given: str = "") -> tuple[Exercise, list[str]]:
+    """The set that a notebook claims, for the variant that was given, and whether that is another
+    one.
 
     Without a course list the notebook has only a name of a variant to give; a table in it counts
     for nothing.
@@ -237,20 +235,8 @@ def claimed(
         )
         # the advice first: the list may be long, and is cut in the table
         raise Unreadable(f"{hint}{error}") from None
-    marked = f"marked as variant {variant.name}" + ", which was given" * bool(given)
-    looks = [f"for variant {name}, and {marked}"] if given and name != given else []
-    for other, what in (call for cell in cells for call in openings(cell.source)):
-        table = (
-            {key: value for key, value in what.items() if key != "name"}
-            if isinstance(what, dict)
-            else None
-        )
-        other_name = what.get("name") if isinstance(what, dict) else what
-        if (other, other_name) not in ((letter, variant.name), (letter, name)):
-            looks.append(f"opens set {other}, variant {other_name}")
-        elif table is not None and table != variant.table:
-            looks.append(f"{marked}, and opens one of its own that has this name")
-    return Exercise(letter, variant), [clean(look) for look in looks]
+    marked = f"for variant {name}, and marked as variant {variant.name}, which was given"
+    return Exercise(letter, variant), [clean(marked)] if given and name != given else []
 
 
 def openings(source: str) -> Iterator[tuple[Any, Any]]:

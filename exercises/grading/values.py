@@ -64,12 +64,8 @@ def encode(value: Any, functions: Functions | None = None) -> Any:
     functions : callable, optional
         Gives a function its number; without it a function is a value of another type.
     """
-    if value is None or type(value) in (bool, float, str):
+    if value is None or type(value) in (bool, int, float, str):
         return value
-    if type(value) is int:
-        return value if abs(value) < 2**63 else ["int", hex(value)]
-    if type(value) is complex:
-        return ["complex", value.real, value.imag]
     if isinstance(value, list | tuple):
         return [
             "list" if isinstance(value, list) else "tuple",
@@ -83,7 +79,8 @@ def encode(value: Any, functions: Functions | None = None) -> Any:
         return ["formula", _text(value)]
     if callable(value) and functions is not None:
         return ["function", functions(value)]
-    if hasattr(value, "__array__") and not isinstance(value, type):  # of NumPy, pandas and the like
+    # of NumPy, pandas and the like
+    if isinstance(value, complex) or (hasattr(value, "__array__") and not isinstance(value, type)):
         return _array(value, functions)
     if isinstance(value, numbers.Real) or type(value).__module__.startswith(("mpmath", "decimal")):
         return float(value)
@@ -106,7 +103,7 @@ def _array(value: Any, functions: Functions | None) -> Any:
         return ["other", f"array of {array.dtype.name}"]
     kind = (
         "scalar"
-        if isinstance(value, np.generic)
+        if isinstance(value, np.generic | complex)
         else "matrix"
         if isinstance(value, np.matrix)
         else "array"
@@ -138,10 +135,6 @@ def _decoded(data: Any, proxies: Proxies | None) -> Any:
     if data is None or isinstance(data, bool | int | float | str):
         return data
     match data:
-        case ["int", str(digits)]:
-            return int(digits, 16)
-        case ["complex", float() | int() as real, float() | int() as imaginary]:
-            return complex(real, imaginary)
         case ["list" | "tuple" as kind, list(parts)]:
             values = [_decoded(part, proxies) for part in parts]
             return values if kind == "list" else tuple(values)

@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 
 from kfcourse.exercises.notebooks.texts import clean, plain, safe, write_csv
 
-LONGEST = 100  # characters of a name: it becomes the name of a folder
-
 
 class Student(NamedTuple):
     """A line of the course list: name and group; what an assignment adds: the variant given, the
@@ -172,11 +170,6 @@ def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[tu
             raise ValueError(
                 f"{where}: {of} without a {key}"
                 + (f" (got {fields[key]!r})" if fields[key] else "")
-            )
-        if len(fields[key]) > LONGEST:
-            raise ValueError(
-                f"{where}: a {key} of more than {LONGEST} characters; is a quote or a line break "
-                f"missing?"
             )
     for key, value in fields.items():
         if clean(value, len(value)) != " ".join(value.split()):

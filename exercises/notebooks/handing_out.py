@@ -13,8 +13,8 @@ from tqdm import tqdm
 
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.notebooks.course_list import assign, save_assignment
-from kfcourse.exercises.notebooks.jobs import Job, Outcome, make, plan, run_all
-from kfcourse.exercises.notebooks.texts import clean
+from kfcourse.exercises.notebooks.jobs import Job, Outcome, make, run_all
+from kfcourse.exercises.notebooks.texts import clean, safe
 from kfcourse.lab.variants import VariantError, chosen_variants, read_variants, usable_variants
 from kfcourse.symbolic.jumping import JumpModel
 
@@ -51,7 +51,12 @@ def hand_out(
     if students:
         work = _for_students(kind, students, [*variants], wanted, out, options)
     else:
-        work = plan(kind, out.absolute(), [*variants], wanted, **options)
+        folder = out.absolute()
+        work = [
+            Job(letter, name, folder / safe(name), kind, **options)
+            for name in variants
+            for letter in wanted
+        ]
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     failed = _show(run_all(work, make, workers, kind), work)

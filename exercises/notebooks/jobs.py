@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +34,6 @@ from kfcourse.exercises.notebooks.execution import (
 from kfcourse.exercises.notebooks.kernels import prefer_forked
 from kfcourse.exercises.notebooks.master import read, render, solution, student
 from kfcourse.exercises.notebooks.nbgrader import source_notebook
-from kfcourse.exercises.notebooks.texts import safe
 from kfcourse.files import package_digest, replacing, save
 from kfcourse.lab.variants import find_variant
 
@@ -182,15 +181,3 @@ def run_all(
         raise ValueError(
             "a working process was killed (out of memory?); run the same again, with fewer --jobs"
         ) from None
-
-
-def plan(
-    kind: str, folder: Path, variants: Iterable[str], letters: Sequence[str], **options: Any
-) -> list[Job]:
-    """One job a set and variant, each variant in a folder of its own; `options` are fields of the
-    jobs."""
-    return [
-        Job(letter, name, folder / safe(name), kind, **options)
-        for name in variants
-        for letter in letters
-    ]

@@ -12,6 +12,7 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from kfcourse.exercises.checks import Exercise
+from kfcourse.exercises.derivations.worked import without_expm1
 from kfcourse.symbolic.sides import Side, plain
 
 COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
@@ -117,10 +118,7 @@ def python(formula: Any) -> str:
             "[" + ", ".join(python(entry) for entry in row) + "]" for row in formula.tolist()
         )
         return f"sp.Matrix([{rows}])"
-    expression = sp.sympify(formula).replace(
-        lambda e: e.func.__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1
-    )
-    return str(_Printer().doprint(expression))
+    return str(_Printer().doprint(without_expm1(sp.sympify(formula))))
 
 
 class _Printer(StrPrinter):

@@ -5,7 +5,6 @@ verification  equations, sentences and numbers that are checked where they are p
 exponents     squares completed in the exponents of normal laws
 tables        tables of numbers
 figures       the style of the figures, labels at the ends of curves
-flights       pictures and tables of a flight and its estimates
 browser       the lab's filters as JavaScript, from their printed equations
 explore       figures that answer when they are touched
 scenes        those of single chapters, and of the front page

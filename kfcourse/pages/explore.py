@@ -85,20 +85,19 @@ def drawn(name: str, says: str, script: str, parts: Iterable[str], settings: Any
     return figure(name, says, f"const {maker} = (() => {{\n{code}\nreturn {maker};\n}})();", call)
 
 
-def value(
+def printed(
     name: str,
     given: Mapping[str, sp.Symbol],
-    e: sp.Expr,
+    made: sp.Expr | Mapping[str, sp.Expr],
     letters: Mapping[sp.Symbol, str] | None = None,
 ) -> str:
-    """A printed function of arrays and coefficients that writes one array, `value`, as
+    """A printed function of arrays and coefficients that writes arrays; one array, `value`, as
     `kfFigure.values` calls it."""
-    return javascript.loop(name, columns(given), columns({"value": e}), coefficients=letters)
-
-
-def columns(of: Mapping[str, sp.Expr]) -> dict[str, sp.Matrix]:
-    """Each entry as a matrix of one, as `javascript.loop` takes them."""
-    return {key: sp.Matrix([formula]) for key, formula in of.items()}
+    results = made if isinstance(made, Mapping) else {"value": made}
+    before, after = (
+        {key: sp.Matrix([formula]) for key, formula in of.items()} for of in (given, results)
+    )
+    return javascript.loop(name, before, after, coefficients=letters)
 
 
 def rounded(rows: Iterable[Iterable[float]]) -> list[list[float]]:
@@ -139,41 +138,6 @@ def line_style(name: str) -> dict[str, str]:
     """A filter's colour and dash, as in every figure of the book."""
     line = style(name)
     return {"colour": line["color"], "dash": _DASHES[line["linestyle"]]}
-
-
-def two_beats(
-    name: str,
-    x: sp.Symbol,
-    y: sp.Symbol,
-    following: sp.Symbol,
-    prior: sp.Expr,
-    likelihood: sp.Expr,
-    transition: sp.Expr,
-    place: sp.Expr,
-    first: float,
-) -> str:
-    """The two beats of the Stratonovich equation, with the measurement under the reader's hand.
-
-    Parameters
-    ----------
-    name : str
-        Of the figure.
-    x, y, following : Symbol
-        State, measurement, next state.
-    prior, likelihood, transition : Expr
-        Densities: of x; of y given x; of the next state given x.
-    place : Expr
-        The measurement without noise, of x: where the handle stands.
-    first : float
-        The measurement shown first.
-    """
-    loops = [
-        value("prior", {"x": x}, prior),
-        value("likelihood", {"x": x}, likelihood, {y: "y"}),
-        value("transition", {"x": x, "next": following}, transition),
-        value("place", {"x": x}, place),
-    ]
-    return drawn(name, "Correction and prediction", "two-beats", loops, first)
 
 
 def two_lines(
@@ -221,8 +185,8 @@ def two_lines(
     }
     moments = {mean: "mean", variance: "variance"}
     loops = [
-        *(value(name, {"x": x}, e, moments) for name, e in curves.items()),
-        javascript.loop("numbers", {}, columns(numbers), coefficients=moments),
+        *(printed(name, {"x": x}, e, moments) for name, e in curves.items()),
+        printed("numbers", {}, numbers, moments),
     ]
     return drawn(name, "The tangent and the best line", "two-lines", loops, dict(first))
 
@@ -258,10 +222,10 @@ def gains(
     """
     letters, each = {prediction: "lambda", variance: "p"}, []
     for short, estimate in estimates.items():
-        gain = value(
+        gain = printed(
             "gain", {"lambda": prediction}, sp.diff(estimate, measurement), {variance: "p"}
         )
-        made = value("estimate", {"y": measurement}, estimate, letters)
+        made = printed("estimate", {"y": measurement}, estimate, letters)
         each.append(f"{json.dumps(short)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
     looks = {name: {"label": title(name), **line_style(name)} for name in estimates}
     settings = {"first": dict(first), "variances": variances, "dots": rounded(dots), "looks": looks}

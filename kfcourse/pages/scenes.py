@@ -2,8 +2,6 @@
 
 one_measurement    ten minutes: the band of a filter does not depend on what is measured
 hidden_fault       consistency: three tests of a filter, and what is wrong with it
-slip               cycle slips: the error of a loop as a ball on the potential of its discriminator
-grid_step          the grid: masses that fall between the humps of a density
 who_leads          the front page: the order of the lab's filters over the step and the noises
 """
 
@@ -21,9 +19,8 @@ from kfcourse.linear.consistency import autocorrelation, chi_squared_bounds, inn
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.experiment import predictions
 from kfcourse.pages.browser import model_source
-from kfcourse.pages.explore import columns, drawn, line_style, rounded, value
+from kfcourse.pages.explore import drawn, line_style, printed, rounded
 from kfcourse.records.examination import normal_bound
-from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
@@ -75,7 +72,7 @@ def one_measurement(
     z, p, lam_next, Psi_next = step(lam, Psi, measured, Q, R)
     given = {"lambda": lam, "Psi": Psi, "y": measured}
     made = {"z": z, "half": sp.Float(Z_95) * sp.sqrt(p), "lambda": lam_next, "Psi": Psi_next}
-    loop = javascript.loop("step", columns(given), columns(made), coefficients={Q: "Q", R: "R"})
+    loop = printed("step", given, made, {Q: "Q", R: "R"})
     settings = {
         "x": rounded([x])[0],
         "y": rounded([y])[0],
@@ -103,8 +100,8 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
     state, z, p, measured, h, F = sp.symbols("x z p y h F")
     parts = [
         f"const model = {model_source(model, ['aof-linearised'])};\n",
-        value("nees", {"x": state, "z": z, "p": p}, (state - z) ** 2 / p),
-        value("white", {"y": measured, "h": h, "F": F}, (measured - h) / sp.sqrt(F)),
+        printed("nees", {"x": state, "z": z, "p": p}, (state - z) ** 2 / p),
+        printed("white", {"y": measured, "h": h, "F": F}, (measured - h) / sp.sqrt(F)),
     ]
     right, seen = linearised(model), y[..., None]
     white = autocorrelation(innovations(right.measure, predictions(aof(right), seen), seen), LAGS)
@@ -126,80 +123,6 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
         },
     }
     return drawn(name, "Which noise is wrong?", "faults", parts, settings)
-
-
-def slip(
-    name: str,
-    error: sp.Symbol,
-    noises: tuple[sp.Symbol, sp.Symbol],
-    sigma: sp.Symbol,
-    following: sp.Expr,
-    potential: sp.Expr,
-    draws: Array,
-    first: Mapping[str, float],
-    levels: tuple[float, float],
-) -> str:
-    """The error of a loop as a ball on a potential, and its trace.
-
-    Parameters
-    ----------
-    name : str
-        Of the figure.
-    error, noises, sigma : Symbol
-        The error; noises of the meter and of the phase; noise of the meter, which a slider moves.
-    following, potential : Expr
-        The next error, and the potential, of them.
-    draws : ndarray (records, 2, steps)
-        Standard normal numbers for the two noises.
-    first : dict
-        "sigma", "draw" (1, 2, ...) and step "k" shown first.
-    levels : (float, float)
-        What sigma is moved between.
-    """
-    letters = {sigma: "sigma"}
-    given = {"Delta": error, "n": noises[0], "v": noises[1]}
-    parts = [
-        javascript.loop(
-            "step", columns(given), columns({"Delta": following}), coefficients=letters
-        ),
-        value("potential", {"Delta": error}, potential, letters),
-    ]
-    settings = {"noises": [rounded(draw) for draw in draws], "first": dict(first), "range": levels}
-    return drawn(name, "A ball on the potential", "slip", parts, settings)
-
-
-def grid_step(
-    name: str,
-    x: sp.Symbol,
-    density: sp.Expr,
-    first: float,
-    places: tuple[float, float],
-    steps: tuple[float, float],
-) -> str:
-    """A density and its masses on nodes whose distance can be moved.
-
-    Parameters
-    ----------
-    name : str
-        Of the figure.
-    x : Symbol
-    density : Expr
-        Of x, up to a constant.
-    first : float
-        The distance shown first.
-    places, steps : (float, float)
-        Where the nodes are, and what their distance is moved between.
-    """
-    settings = {
-        "first": first,
-        "low": places[0],
-        "high": places[1],
-        "least": steps[0],
-        "most": steps[1],
-    }
-    return drawn(
-        name, "Masses on a grid", "grid-step", [value("density", {"x": x}, density)], settings
-    )
 
 
 def leading(cells: dict[tuple[float, float], Comparison]) -> dict[str, Any]:

@@ -61,9 +61,8 @@ def mixed(mu: Array, pi: Array, z: Array, p: Array) -> tuple[Array, Array, Array
 def decide(faulty: Array, missed: float, alarm: float) -> tuple[Array, Array]:
     """1 where the meter is called faulty, else 0, and the mean loss of that; of probabilities that
     it is faulty."""
-    say_sound, say_faulty = faulty * missed, (1 - faulty) * alarm
-    called = say_faulty < say_sound
-    return called * 1.0, np.where(called, say_faulty, say_sound)
+    called = (1 - faulty) * alarm < faulty * missed
+    return called * 1.0, np.where(called, (1 - faulty) * alarm, faulty * missed)
 
 
 # -- o5: the spread of the means, line by line

@@ -238,39 +238,39 @@ WRONG_DECISIONS = edits(
     (
         "losses-ignored",
         "The likelier mode is called, whatever an error costs.",
-        "say_faulty < say_sound",
+        "(1 - faulty) * alarm < faulty * missed",
         "faulty > 0.5",
     ),
-    ("losses-swapped", SWAPPED, "    say_sound", "    missed, alarm = alarm, missed; say_sound"),
+    ("losses-swapped", SWAPPED, "    called =", "    missed, alarm = alarm, missed; called ="),
     (
         "losses-swapped",
         SWAPPED,
-        "np.where(called, say_faulty, say_sound)",
+        "np.where(called, (1 - faulty) * alarm, faulty * missed)",
         "np.where(called, (1 - faulty) * missed, faulty * alarm)",
     ),
     (
         "other-way",
         "The larger of the two losses is chosen.",
-        "say_faulty < say_sound",
-        "say_faulty > say_sound",
+        "alarm < faulty",
+        "alarm > faulty",
     ),
     (
         "odds",
         "That is the limit of the odds, the probability of a fault over that of none, not of the "
         "probability.",
-        "say_faulty < say_sound",
+        "(1 - faulty) * alarm < faulty * missed",
         "faulty > alarm / missed",
     ),
     (
         "right-calls-paid",
         "The loss is that of a right call: who says faulty pays only if the meter is sound.",
-        "np.where(called, say_faulty, say_sound)",
+        "np.where(called, (1 - faulty) * alarm, faulty * missed)",
         "np.where(called, faulty * alarm, (1 - faulty) * missed)",
     ),
     (
         "probabilities-forgotten",
         "The losses alone are compared: how probable is each error?",
-        "say_sound, say_faulty = faulty * missed, (1 - faulty) * alarm",
-        "say_sound, say_faulty = 0 * faulty + missed, 0 * faulty + alarm",
+        "    called =",
+        "    return 0 * faulty + (alarm < missed), 0 * faulty + min(alarm, missed)\n    called =",
     ),
 )

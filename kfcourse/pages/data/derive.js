@@ -12,12 +12,13 @@
   const MEANS = ["M", "D", "Cov"];
   const ROUNDING = 1e-10, CLEAR = 1e-4, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, MOST_TRIED = 30000, SECONDS = 3;
   const LONGEST = 600, DEEPEST = 60, MAX_LENGTH = 2000, MAX_EXPONENT = 16, MOST_LINES = 400;
+  const FORGOTTEN = "noise-forgotten";
   const COSTS = {
-    sign: 1, doubled: 1.05, letter: 1.1, moment: 1.25, power: 1.2, factor: 1.2, "noise-forgotten": 1.22, "noise-mean": 1.45,
-    "lost-factor": 1.3, extra: 1.4, function: 1.4, lost: 1.5,
+    sign: 1, doubled: 1.05, letter: 1.1, moment: 1.25, power: 1.2, factor: 1.2, [FORGOTTEN]: 1.22,
+    "lost-factor": 1.3, extra: 1.4, lost: 1.5,
   };
   const NUMBERS = [-1, 2, 3, 4, 5, 6, 1 / 2, 3 / 2, 5 / 2, 1 / 3, 2 / 3, 4 / 3, 5 / 3, 1 / 4, 3 / 4, 5 / 4, 1 / 5, 2 / 5, 3 / 5, 4 / 5, 6 / 5, 1 / 6, 5 / 6];
-  const POWERS = [1, 2, 3, 4, 0.5, -1, -2], OF_THE_LINE_ABOVE = 1, PROBES = [17 / 60, 71 / 60, -49 / 60];
+  const POWERS = [1, 2, 3, 4, 0.5, -1, -2], OF_THE_LINE_ABOVE = 1;
   const OF_FILTERS = ["y", "K", "R", "lambda", "Psi", "m", "d", "z", "p", "tau", "Theta", "h", "G", "F"];
 
   class Unreadable extends Error {
@@ -586,7 +587,7 @@
         if (kept.length && cost > kept[0][0] + 1e-9) break;
         const here = place(slip);
         if (kept.some(([, one]) => here.length <= place(one).length && starts(place(one), here))) continue;
-        if (this.equal(tree, slip.above || ofNoise(slip) ? this.line : this.above)) kept.push([cost, slip]);
+        if (this.equal(tree, slip.above || slip.kind === FORGOTTEN ? this.line : this.above)) kept.push([cost, slip]);
       }
       const slips = kept.map(([, slip]) => slip);
       if (slips.length && slips[0].kind === "doubled") return slips.slice(-1);
@@ -596,25 +597,24 @@
     fitting() {
       const found = [], moments = this.moments(), end = Date.now() + 1000 * SECONDS, there = letters(this.above);
       for (const name of this.setting.noises.filter((one) => there.has(one))) {
-        for (const [kind, value] of [["noise-forgotten", 0], ["noise-mean", 1]]) {
-          const tree = replaced(this.above, { [name]: number(value) });
-          if (this.fits(tree, this.mine)) found.push([COSTS[kind], makeSlip(kind, [], name), tree]);
-        }
+        const tree = replaced(this.above, { [name]: number(0) });
+        if (this.fits(tree, this.mine)) found.push([COSTS[FORGOTTEN], makeSlip(FORGOTTEN, [], name), tree]);
       }
       let count = 0;
       for (const [root, target, ofAbove] of [[this.line, this.theirs, false], [this.above, this.mine, true]]) {
         for (const [path, node] of walk(root)) {
-          const around = path.map((_, i) => at(root, path.slice(0, i))), wanted = this.wanted(root, path, around, target);
+          const around = path.map((_, i) => at(root, path.slice(0, i)));
           const changes = this.ofMoments(path, node, around, moments, ofAbove);
-          if (!ofAbove) changes.push(...this.ofNode(path, node, around, wanted));
+          if (!ofAbove) changes.push(...this.ofNode(path, node, around));
           for (const [cost, slip, other] of changes) {
             if (++count > MOST_TRIED || Date.now() > end) return found;
-            if (!(wanted ? this.fits(other, wanted) : this.fits(changed(root, path, other), target))) continue;
             const tree = changed(root, path, other);
-            if (!this.nothing(tree, path, around, slip.kind)) found.push([cost, slip, tree]);
+            if (this.fits(tree, target) && !this.nothing(tree, path, around, slip.kind)) found.push([cost, slip, tree]);
           }
         }
       }
+      const lost = this.lost();
+      if (lost) found.push(lost);
       return found;
     }
 
@@ -634,17 +634,6 @@
       return this.values.of(kind === "lost-factor" ? outer.parts[0] : outer).every((one) => Math.abs(one) <= 1e-9);
     }
 
-    // what the value of a node should be; null inside a power, a function or a mean: outside the line is (a + b t)/(c + d t)
-    wanted(root, path, around, target) {
-      if (around.some((one) => !["sum", "product"].includes(one.kind))) return null;
-      const [p, q, r] = PROBES, [first, second, third] = PROBES.map((value) => this.values.of(changed(root, path, number(value))));
-      const wanted = target.map((v, i) => {
-        const ratio = ((((v - first[i]) * (second[i] - third[i])) / (v - third[i]) / (second[i] - first[i])) * (q - p)) / (q - r);
-        return (p - ratio * r) / (1 - ratio);
-      });
-      return wanted.every(Number.isFinite) ? wanted : null;
-    }
-
     ofMoments(path, node, around, moments, above) {
       if (around.length && !["sum", "power"].includes(around[around.length - 1].kind)) return [];
       return moments.map(([wrong, right, order]) => [
@@ -653,7 +642,7 @@
       ]);
     }
 
-    ofNode(path, node, around, wanted) {
+    ofNode(path, node, around) {
       const found = [], { kind, parts, data } = node, outer = around.length ? around[around.length - 1].kind : "";
       const beside = around.length && around[around.length - 1].parts.length > 1;
       const add = (what, other, name = "", below = [], more = 0, lost = null) =>
@@ -670,7 +659,6 @@
       if (kind === "letter") for (const name of this.pool) if (name !== data) add("letter", letter(name), data);
       const [base, own] = kind === "power" ? [parts[0], data] : [node, 1], nameOf = (one) => (one.kind === "letter" ? one.data : "");
       if (base.kind !== "number") for (const k of POWERS) if (k !== own) add("power", power(base, k), nameOf(base));
-      if (kind === "call") for (const name of ENTIRE) add("function", make("call", parts, name), data);
       if (kind === "product") parts.forEach((part, i) => add("extra", without(i, 1), nameOf(part), [i]));
       if (outer !== "product") {
         for (const q of NUMBERS) add(q === -1 ? "sign" : "factor", product([number(q), node]), "", [], kind === "letter" && beside ? 0.35 : 0);
@@ -680,25 +668,22 @@
         for (const [, one] of this.terms) {
           for (const term of [one, mean(one)]) for (const sign of [1, -1]) add("lost", total([node, term], [1, sign]), "", [], 0, one);
         }
-        const monomial = wanted && this.monomial(this.values.of(node).map((v, p) => wanted[p] - v));
-        if (monomial) {
-          const [q, powers] = monomial, names = powers.map(([name]) => name).join(" and ");
-          const more = 0.02 * powers.reduce((s, [, k]) => s + Math.abs(k), 0) + (kind === "sum" ? 0 : 0.1);
-          add("lost", total([node, product([number(q), ...powers.map(([name, k]) => power(letter(name), k))])]), names, [], more);
-        }
       }
       return found;
     }
 
-    // q and powers of letters of which these may be the values
-    monomial(values) {
-      const logs = values.map((one) => Math.log(Math.abs(one)));
+    // what the line lacks, if that is a number times powers of letters
+    lost() {
+      const values = this.theirs.map((one, p) => one - this.mine[p]), logs = values.map((one) => Math.log(Math.abs(one)));
       const powers = this.inverse.slice(1).map((row) => Math.round(row.reduce((s, one, p) => s + one * logs[p], 0)));
       if (!powers.every((one) => Math.abs(one) <= 12)) return null;
       const rest = values.map((one, p) => this.letters.reduce((v, name, i) => v / this.values.letter(name)[p] ** powers[i], one));
       const sorted = rest.sort((a, b) => a - b), n = sorted.length;
       const q = rational((sorted[Math.floor((n - 1) / 2)] + sorted[Math.ceil((n - 1) / 2)]) / 2);
-      return q && [q, this.letters.map((name, i) => [name, powers[i]]).filter(([, k]) => k)];
+      const there = this.letters.map((name, i) => [name, powers[i]]).filter(([, k]) => k);
+      const tree = q && total([this.line, product([number(q), ...there.map(([name, k]) => power(letter(name), k))])]);
+      if (!tree || !this.fits(tree, this.theirs)) return null;
+      return [COSTS.lost, makeSlip("lost", [], there.map(([name]) => name).join(" and ")), tree];
     }
 
     // wrong and right moments of the normal law, and their order; of functions, too
@@ -743,7 +728,7 @@
     }
 
     unlikely(slip) { // changing a term that is nothing, or that stands in the line above as it is
-      if (slip.above || ofNoise(slip) || ["doubled", "extra", "lost"].includes(slip.kind)) return 0;
+      if (slip.above || [FORGOTTEN, "doubled", "extra", "lost"].includes(slip.kind)) return 0;
       const path = termPath(this.line, slip.path), sign = path.length ? at(this.line, path.slice(0, -1)).data[path[path.length - 1]] : 1;
       const value = this.values.of(at(this.line, path)).map((one) => sign * one);
       const stays = path.length && this.terms.some(([own, one]) => same(value, this.values.of(one).map((v) => own * v)));
@@ -759,7 +744,6 @@
   }
 
   const makeSlip = (kind, path, name = "", more = {}) => ({ kind, path, name, order: 0, lost: null, above: false, ...more });
-  const ofNoise = (slip) => slip.kind.startsWith("noise");
 
   function pseudoInverse(rows) { // (A^T A)^-1 A^T by Gauss and Jordan
     const n = rows[0].length;
@@ -801,10 +785,8 @@
       power: `${name || "something"} has the wrong power in \`${term}\``,
       factor: `a number in \`${term}\` is not right`,
       "noise-forgotten": `the mean square of the noise ${name} is forgotten: its part is missing`,
-      "noise-mean": `the mean of the noise ${name} is not zero in this line`,
       "lost-factor": `a factor is lost from \`${term}\`: ${name}`,
       extra: name ? `something in \`${term}\` does not belong there` : `\`${term}\` does not belong there`,
-      function: `in \`${term}\` another function belongs in the place of ${name}`,
       lost: `a term is lost${lost}, in \`${term}\``,
     };
     return [says[slip.kind], term];
@@ -817,7 +799,7 @@
     const noises = [...letters(above)].some((one) => setting.noises.includes(one) && !here.has(one));
     const means = (node) => walk(node).map(([, one]) => one).filter((one) => one.kind === "mean" && [...letters(one)].some((s) => setting.states.includes(s)));
     const squares = (node) => walk(node).filter(([, one]) => one.kind === "power" && one.parts[0].kind === "sum").length;
-    if (["noise-forgotten", "noise-mean"].includes(kind) || (noises && ["extra", "lost", "doubled", ""].includes(kind))) return rules.noise;
+    if (kind === FORGOTTEN || (noises && ["extra", "lost", "doubled", ""].includes(kind))) return rules.noise;
     if (kind === "moment" || means(above).length > means(line).length) {
       return rules[means(above).some((one) => walk(one).some(([, inner]) => inner.kind === "call")) ? "functions" : "moments"];
     }

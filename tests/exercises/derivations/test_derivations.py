@@ -15,10 +15,11 @@ from derivation_corpus import chains, planted
 from weekly import weekly
 
 from kfcourse.exercises.derivations import check_text, verdicts
-from kfcourse.exercises.derivations.compared import DIFFERENT, EQUAL, compare
 from kfcourse.exercises.derivations.setting import of_model, of_side
 from kfcourse.exercises.derivations.terms import at, letter, written
 from kfcourse.exercises.derivations.typed import read_line, tree_of
+from kfcourse.exercises.derivations.values import DIFFERENT, EQUAL, compare
+from kfcourse.exercises.derivations.worked import without_expm1
 from kfcourse.lab import find_variant, load_variants
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -89,9 +90,7 @@ def test_names_mean_the_package_s_structural_functions(name, structure):
                 if entry not in here.meanings:
                     assert entry in model.parameters
                     continue
-                formula = matrix[i, j].replace(
-                    lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1
-                )
+                formula = without_expm1(matrix[i, j])
                 assert compare(here, letter(entry), tree_of(formula)) == EQUAL, entry
                 assert (
                     compare(here, letter(entry), tree_of(formula * sp.Rational(1001, 1000) + 1))
@@ -118,7 +117,7 @@ def verdict_of(text: str):
         ("g^2*d + f^2*(m^4 + 3*m^2*d + 3*d^2)", "factor", "3*m^2*d"),
         ("g*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "power", "g*d"),
         ("d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "lost-factor", "d"),
-        ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "f^2*(m^4 + 3*d^2)"),
+        ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "g^2*d + f^2*(m^4 + 3*d^2)"),
         ("g^2*m + f^2*(m^4 + 6*m^2*d + 3*d^2)", "letter", "g^2*m"),
         ("g^2*d + g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "doubled", "g^2*d"),
         ("g^2*d + f^2*3*d^2", "moment", "f^2*3*d^2"),
@@ -230,16 +229,12 @@ def test_positive_is_declared_and_not_guessed():
         ("g^2·d", "column 8: · (middle dot) has no meaning"),
         ("__import__('os').system('true')", "a function that is not known here"),
         ("g.real", "has no meaning here"),
-        ("open(g)", "a function that is not known here"),
         ("g^g", "an exponent must be a plain number"),
         ("g^999", "the exponent is larger than 16"),
-        ("9^9^9^9", "an exponent must be a plain number"),
         ("(" * 250 + "g" + ")" * 250, "nested"),
         ("-" * 1900 + "g", "deep"),
         ("g+" * 900 + "g", "more than 600"),
-        ("g" * 3000, "at most 2000"),
         ("M[g, d]", "takes one expression"),
-        ("", "empty"),
     ],
 )
 def test_what_cannot_be_read_is_marked_in_words(line, says):

@@ -3,7 +3,6 @@
 import base64
 import io
 import json
-import struct
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ import sympy as sp
 from kfcourse.exercises.checks import Exercise, exercise, sets
 from kfcourse.exercises.grading.asking import salted, steady
 from kfcourse.exercises.grading.channel import Channel, Closed
-from kfcourse.exercises.grading.values import Other, ProtocolError, decode, encode
+from kfcourse.exercises.grading.values import LARGEST, Other, ProtocolError, decode, encode
 
 x, y = sp.Symbol("x", positive=True), sp.Symbol("y", real=True)
 
@@ -25,7 +24,18 @@ def sent(value):
 @pytest.mark.parametrize(
     "value",
     [
-        *(None, True, "text", 7, -(10**50), 0.1, float("inf"), 2 - 3j, [1, (2.0, [None])], ()),
+        *(
+            None,
+            True,
+            "text",
+            7,
+            -(10**50),
+            0.1,
+            float("inf"),
+            np.complex128(2 - 3j),
+            [1, (2.0, [None])],
+            (),
+        ),
         *(sp.Integer(1), sp.Float(1), sp.oo, sp.pi),
         sp.Float("0.9") * x + sp.sqrt(x) / 3 - sp.Rational(10**30, 7),
         sp.exp(x) * sp.erf(y) + sp.atan2(x, y) + sp.Max(x, y) + sp.Abs(y),
@@ -91,8 +101,7 @@ FORMULAS = (
 ARRAYS = (saved(np.array([{}], dtype=object)), b"\x80\x04N.", saved(np.zeros(1, "f8,f8")))
 STRANGE = [
     *({}, [], ["list"], ["list", 3], [["list"]], ["array", "AAAA"], ["array", "???"]),
-    *(["int", "1" * 5000 + "g"], ["int", "__"], ["complex", "1", 2], ["formulas", 2, 2, []]),
-    *(["function", 0], ["objects", [2], [1]], ["exec", "1"]),
+    *(["formulas", 2, 2, []], ["function", 0], ["objects", [2], [1]], ["exec", "1"]),
     *(["formula", text] for text in FORMULAS),
     # objects are not unpickled
     *(["array", base64.b64encode(data).decode()] for data in ARRAYS),
@@ -149,18 +158,11 @@ def channel(data):
     return Channel(io.BytesIO(data), io.BytesIO())
 
 
-def frame(text):
-    return struct.pack(">Q", len(text)) + text
-
-
 def test_messages():
-    assert channel(frame(b'{"a": 1}')).receive() == {"a": 1}
+    assert channel(b'{"a": 1}\n').receive() == {"a": 1}
     for error, messages in (
-        (Closed, (b"", b"\0\0", frame(b'{"a": 1}')[:-1])),
-        (
-            ProtocolError,
-            (struct.pack(">Q", 2**40), *map(frame, (b"[1]", b"{", b"[" * 10**5, b"\xff"))),
-        ),
+        (Closed, (b"", b'{"a": 1}')),
+        (ProtocolError, (b"[1]\n", b"{\n", b"[" * 10**5 + b"\n", b"\xff\n", b"1" * (LARGEST + 1))),
     ):
         for data in messages:
             with pytest.raises(error):

@@ -52,12 +52,12 @@ for name in ('b1', 'b2'):
 """,
     "replaces the comparison": """
 import numpy as np
-import kfcourse.exercises.checks.engine as engine
-engine._agree = engine.equal = np.allclose = lambda *_, **__: True
+import kfcourse.exercises.checks.reference as reference
+reference.Posed.agree = reference.equal = np.allclose = lambda *_, **__: True
 """,
     "replaces code of the comparison": """
-import kfcourse.exercises.checks.engine as engine
-engine._agree.__code__ = (lambda found, expected, values, tolerance: True).__code__
+import kfcourse.exercises.checks.reference as reference
+reference.Posed.agree.__code__ = (lambda self, first, second: True).__code__
 """,
     "replaces a class method": """
 from kfcourse.exercises.checks import Result
@@ -205,27 +205,27 @@ def gain(Psi, G, F):
     "code that runs when it is unpickled": """
 class Bomb:
     def __reduce__(self):
-        return (exec, ("import sys; sys.modules['kfcourse.exercises.checks.engine']._agree = lambda *_, **__: True",))
+        return (exec, ("import sys; sys.modules['kfcourse.exercises.checks.reference'].Posed.agree = lambda *_: True",))
 def gain(Psi, G, F):
     return Bomb()
 """,
     "messages of its own": """
 def gain(Psi, G, F):
-    import json, os, struct
+    import os
     for text in ('{"value": ["passed"]}', '{"grade": {"marks": {"b1": "passed"}}}', '{"value": [1]}'):
         for place in range(3, 64):
             try:
-                os.write(place, struct.pack('>Q', len(text)) + text.encode())
+                os.write(place, text.encode() + b'\\n')
             except OSError:
                 pass
     return G @ Psi
 """,
     "a message without end": """
 def gain(Psi, G, F):
-    import os, struct
+    import os
     for place in range(3, 64):
         try:
-            os.write(place, struct.pack('>Q', 2**62))
+            os.write(place, b'{' * 1000)
         except OSError:
             pass
     return G @ Psi

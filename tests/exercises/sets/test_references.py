@@ -1,18 +1,15 @@
-"""Keys of sets f, g, h, j, l, o, p against independent references: the package's filters,
+"""Keys of sets f, g, h, l, o against independent references: the package's filters,
 derivatives, an integrator."""
 
 from dataclasses import replace
 
-import control
 import numpy as np
 import pytest
-import sympy as sp
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from kfcourse import (
     Gaussian,
-    GaussianMoments,
     Model,
     gaussian,
     linearised,
@@ -32,8 +29,7 @@ from kfcourse.exercises.sets.h_continuous import keys as continuous_time
 from kfcourse.exercises.sets.h_continuous import questions as continuous_questions
 from kfcourse.exercises.sets.o_modes import keys as modes
 from kfcourse.exercises.sets.o_modes import questions as modes_questions
-from kfcourse.exercises.sets.p_find_the_slip import keys as slips
-from kfcourse.filters import alphabeta, aof, kalman_filter, logic_dynamic
+from kfcourse.filters import aof, kalman_filter, logic_dynamic
 from kfcourse.lab import find_variant
 from kfcourse.linear.consistency import innovations, nees, nis
 from kfcourse.scenarios.navigation import Dynamics, Observation, Sensor, fuse
@@ -140,25 +136,6 @@ def asked(letter, name):
     return question.key, question.arguments(task)
 
 
-def test_the_alpha_beta_filter_and_its_gains_are_the_package_s():
-    key, calls = asked("j", "j4")
-    for y, T, alpha, beta, r, v in calls:
-        # the same filter as a linear system: x' = A (I - K H) x + A K y on each axis
-        A, K, H = np.array([[1, T], [0, 1]]), np.array([[alpha], [beta / T]]), np.eye(1, 2)
-        out = control.ss(A @ (np.eye(2) - K @ H), A @ K, np.eye(2) - K @ H, K, T)
-        positions, velocities = key(y, T, alpha, beta, r, v)
-        for run_, axis in np.ndindex(y.shape[1:]):
-            start = [np.broadcast_to(part, y.shape[1:])[run_, axis] for part in (r, v)]
-            expected = control.forced_response(out, U=y[:, run_, axis], X0=start).outputs
-            assert_allclose(positions[:, run_, axis], expected[0], rtol=1e-9, atol=1e-9)
-            assert_allclose(velocities[:, run_, axis], expected[1], rtol=1e-9, atol=1e-9)
-    key, calls = asked("j", "j3")
-    for (alpha,) in calls:
-        assert key(alpha) == pytest.approx(
-            (alphabeta.steady_beta(alpha), alphabeta.tracking_index(alpha))
-        )
-
-
 def test_late_measurements_are_fused_as_by_the_package():
     key, calls = asked("l", "l5")
     for tags, arrivals, values, m, P, q, r, now in calls:
@@ -173,26 +150,3 @@ def test_late_measurements_are_fused_as_by_the_package():
         mean, cov = key(tags, arrivals, values, m, P, q, r, now)
         assert_allclose(mean, law.mean[0, 0], rtol=1e-9)
         assert_allclose(cov, law.cov[0, 0], rtol=1e-9)
-
-
-def test_formulas_without_a_slip_are_moments_of_the_package():
-    x1, x2, v, w1, w2, a, q, G, gamma, r = sp.symbols("x1 x2 v w1 w2 a q G gamma r", real=True)
-    m1, m2, d11, d12, d22 = law = sp.symbols("m1 m2 d11 d12 d22", real=True)
-    root = sp.Symbol("root", positive=True)
-    pair = GaussianMoments(
-        [x1, x2, v, w1, w2],
-        [m1, m2, 0, 0, 0],
-        sp.diag(sp.Matrix([[d11, d12], [d12, d22]]), 1, 1, r),
-    )
-    square = pair.mean_of(sp.expand((a * x1 + root * v) ** 2)).subs(root, sp.sqrt(q))
-    assert sp.simplify(slips.second_moment(a, q, m1, d11) - square) == 0
-    y = gamma * (G * x1 + w2)
-    assert sp.simplify(slips.scaled_meter(gamma, G, d11, r) - pair.covariance(y, y)) == 0
-    assert sp.simplify(slips.noise_intensity(*law) - pair.mean_of(x1**2)) == 0
-    meters = (x1**2 + v, x2 + w1)
-    F = sp.Matrix(2, 2, lambda i, j: pair.covariance(meters[i], meters[j]))
-    assert sp.simplify(slips.meter_variance(*law) - F) == sp.zeros(2, 2)
-    E, kappa = sp.symbols("E kappa", real=True)
-    forces = E * (sp.cos(x2) - kappa * sp.sin(x2)), E * (sp.sin(x2) + kappa * sp.cos(x2))
-    for slope, force in zip(slips.by_angle(E, kappa, x2), forces, strict=True):
-        assert sp.simplify(slope - force.diff(x2)) == 0
