@@ -625,7 +625,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
             if weight_law < 0:
                 model.law(weight_law, Q, 0.0, model.constants, x, weight, s)
             model.law(model.moves, Q, 0.0, model.constants, x, m, s)
-            share, covered, least, calm, steep = 0.0, 0.0, np.inf, np.inf, False
+            share, given, covered, least, calm, steep = 0.0, 0.0, 0.0, np.inf, np.inf, False
             for i in range(Q):
                 covered, calm = max(covered, abs(m[i] - m[0])), min(calm, s[i])
                 slope[i] = 0.0
@@ -639,8 +639,10 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                     value = value_at(power, 0.5 * (a + b) + part * POINT[i])
                 x[i] = value + top + shift + length + LN_WEIGHT[i]
             for i in range(Q):
-                mass[i] = density(x[i]) * weight[i]
+                mass[i] = density(x[i])
                 share += mass[i]
+                mass[i] *= weight[i]
+                given += mass[i]
             for i in range(Q):
                 t = 0.5 * (a + b) + part * POINT[i]
                 blur = abs(slope[i]) / (part * size) * between(before, after, t)
@@ -651,6 +653,8 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 least = min(least, deviation[i])
             digits = 10 * ROUNDING * abs(m[0])
             rough = max(unresolved(m) + unresolved(s) - digits, 0.0) / least
+            if weight_law < 0:
+                rough += unresolved(weight)
             # a measurement may ask for what has little share
             gaps = (
                 covered > span * least
@@ -679,7 +683,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                     low = min(low, m[i] - sqrt(reach) * wide)
                     high = max(high, m[i] + sqrt(reach) * wide)
             count += 1
-            whole += share
+            whole += given
             error += share * rough
             if a == -1:
                 edge[many] = m[0], 0.0, deviation[0]
