@@ -486,7 +486,7 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
     for p in range(n):
         low, high = min(low, P[p, LEFT]), max(high, P[p, RIGHT])
         likeliest = p if P[p, BOUND] > P[likeliest, BOUND] else likeliest
-    integral = mean = variance = error = origin = 0.0
+    integral = mean = variance = error = origin = stride = 0.0
     for _ in range(TURNS):
         for i in range(n):
             p = (i + likeliest) % n
@@ -507,6 +507,17 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
             if n > PANELS - 4:
                 return PANELLED, 0
             left, right = P[p, LEFT], P[p, RIGHT]
+            # far where the density still rises; else by one panel, then by twice as much, since a
+            # panel far too long would count as mass
+            further = 2 * (high - low) if p == likeliest else max(2 * stride, right - left)
+            if left == low and P[p, 0] > peak - GOES_ON:
+                stride, low = further, left - further
+                new(P, n, low, left)
+                n += 1
+            if right == high and P[p, Q - 1] > peak - GOES_ON:
+                stride, high = further, right + further
+                new(P, n, right, high)
+                n += 1
             far = max(abs(left - origin - mean), abs(right - origin - mean))
             share = P[p, SHARE] * (1 + far * far / variance)
             rough = share * max(P[p, LOG_ROUGH], P[p, ROUGH])
@@ -516,15 +527,6 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
                 n += 1
                 continue
             error += 0.25 * share * (P[p, LOG_ROUGH] + P[p, ROUGH])
-            size = 2 * (high - low)
-            if left == low and P[p, 0] > peak - GOES_ON:
-                low = left - size
-                new(P, n, low, left)
-                n += 1
-            if right == high and P[p, Q - 1] > peak - GOES_ON:
-                high = right + size
-                new(P, n, right, high)
-                n += 1
         if n == before:
             break
     else:
