@@ -127,15 +127,6 @@ def structure_of(filter_: Filter, what: str) -> Structure:
     return filter_.structure
 
 
-def unknown_error(filter_: Filter) -> ValueError:
-    """What is raised where a filter is asked how far its laws are from the true ones, and cannot
-    tell."""
-    return ValueError(
-        f"{filter_.name} does not know how good its laws are: ask pointmass(model), which is "
-        "exact, or particle(model)"
-    )
-
-
 def _on_circle(step: Advance, angles: Components) -> Advance:
     """The step with estimates and predictions of angles between -pi and pi."""
 
