@@ -88,7 +88,10 @@ def _clear_errors() -> Iterator[None]:
             yield
     except BrokenPipeError:
         raise
-    except (ValueError, NotFinite, OSError) as error:
+    except OSError as error:
+        where = f": {error.filename}" if error.filename else ""
+        raise click.ClickException(f"{error.strerror or error}{where}") from None
+    except (ValueError, NotFinite) as error:
         raise click.ClickException(str(error)) from None
     except MemoryError:
         raise click.ClickException(

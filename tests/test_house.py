@@ -203,7 +203,7 @@ ROOMS = {
     "exercises/grading": 17_130,
     "exercises/notebooks": 7_940,
     "exercises/sets": 42_040,
-    "kfcourse/*.py": 6_200,
+    "kfcourse/*.py": 6_220,
     "kfcourse/continuous": 9_840,
     "kfcourse/filters": 30_830,
     "kfcourse/lab": 19_030,
