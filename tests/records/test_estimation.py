@@ -43,23 +43,6 @@ def test_a_variance_alone_has_its_closed_form():
     assert estimated.standard_error[0] == pytest.approx(expected * np.sqrt(2 / 198), rel=1e-5)
 
 
-@pytest.mark.parametrize("start", [1.0, 3.0])
-def test_a_direction_that_is_not_told_is_named_whole(start):
-    """g of any sign and a positive q: only g^2 q reaches the measurements, and neither gets a
-    finite error."""
-    model = Model.define(
-        "0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0}
-    )
-    y = simulate(model, 1, 30, seed=1).y
-    estimated = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
-    assert (
-        len(estimated.flat) == 1
-        and "does not tell g (" in estimated.flat[0]
-        and ", q (" in estimated.flat[0]
-    )
-    assert np.isinf(estimated.standard_error).all()
-
-
 def test_what_the_record_does_not_tell_is_named():
     """Only the product of g and s reaches the measurements: one doubled and the other halved,
     nothing changes."""
