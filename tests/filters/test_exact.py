@@ -373,3 +373,13 @@ def test_what_its_memory_shows_is_a_density():
 def test_a_law_is_printed_once_for_all_numbers():
     model = VARIANTS["53"]
     assert pointmasses.printed(model) == pointmasses.printed(model.replace(f=0.3))
+
+
+def test_states_are_drawn_from_the_posterior():
+    """Two million: the variance of one trajectory's in units of the filter's is known to 1e-3."""
+    model = Model.define("0.9*x + 0.5*v", "x + 0.5*w")
+    state = states(filters.pointmass(model), simulate(model, 40, 3, seed=3).y)[-1]
+    x, mode = state.memory.drawn(50_000, np.random.default_rng(1))
+    z = (x - state.posterior.mean) / np.sqrt(state.posterior.cov[..., 0])
+    assert x.shape == (50_000, 40, 1) and not mode.any()
+    assert abs(z.mean()) < 3e-3 and abs((z**2).mean() - 1) < 3e-3

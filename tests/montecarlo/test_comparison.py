@@ -146,21 +146,6 @@ def test_intervals_are_student_s(direct):
         estimate.interval(95)
 
 
-@pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say(linear):
-    """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors
-    around 190."""
-    single = kalman_filter(linear)
-    truth = float(np.trace(single.step(single.init(1), np.zeros((1, 2))).posterior.cov))
-    hits = 0
-    for seed in range(200):
-        low, high = (
-            compare([single], linear, 400, 1, seed, jobs=1).error_variance("kalman").interval(0.95)
-        )
-        hits += bool(low[0] < truth < high[0])
-    assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
-
-
 # ---------------------------------------------------------------- initial states
 
 
