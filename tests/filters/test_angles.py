@@ -32,6 +32,7 @@ from kfcourse.filters import (
     duof,
     fbp,
     fos,
+    gated,
     imm,
     iterated,
     kalman_filter,
@@ -222,6 +223,7 @@ def test_a_phase_is_filtered_on_the_circle_as_on_the_line():
     structures = [linearised(circle), gaussian(circle), unscented(circle), gauss_hermite(circle, 3)]
     filters = [kalman_filter(circle), *(aof(s) for s in structures), iterated(structures[0], 3)]
     filters += [imm([structures[0], structures[1]], [[0.9, 0.1], [0.1, 0.9]])]
+    filters += [gated(kalman_filter(circle), 1 - 1e-12)]  # an innovation of a turn is none
     for filter_ in filters:
         law, name = run(filter_, around_y), filter_.name
         assert np.abs(law.mean[..., 0]).max() <= PI
