@@ -222,7 +222,6 @@ def test_functions_of_a_model_with_time_want_the_step():
         (np.zeros((1, 1)), np.ones((1, 1, 1))),
     )
     for use in (
-        lambda: linearised(model).predict(*law),
         lambda: linearised(model).measure(*law),
         lambda: compile_model(model)[0](*np.zeros((2, 1, 1))),
         lambda: compile_noiseless(model)[0](np.zeros((1, 1))),
