@@ -327,7 +327,7 @@ def test_threads_change_no_number(monkeypatch):
         ("x + v**2", "x + w", "noise enters nonlinearly.*gauss_hermite"),
         *(
             ("x + v", meter, "noise enters nonlinearly.*gauss_hermite")
-            for meter in ("x + w**3", "x + w**2", "x + sin(w)", "exp(w*x) + w")
+            for meter in ("x + w**2", "exp(w*x) + w")
         ),
         ("x*exp(v)", "x + w", "noise enters nonlinearly.*gauss_hermite"),
         ("0.9*x + v", "x**2", "no noise enters the meter"),
