@@ -47,7 +47,7 @@ HEADINGS = ("letters", "positive")
 
 
 @dataclass(frozen=True)
-class Posed:
+class ToDerive:
     """What is to be derived.
 
     Attributes
@@ -89,11 +89,11 @@ class Posed:
         return f"the normal law of {states}, with the means {means} and the covariances {covs},"
 
 
-def posed_by(model: Model, name: str) -> Posed:
+def posed_by(model: Model, name: str) -> ToDerive:
     """The derivation of a structural function of a model; ModelError if derivations are not checked
     for it."""
     setting = of_model(model)
-    return Posed(
+    return ToDerive(
         setting, name, frozenset(model.parameters) | set(of_side(setting, name).law.letters)
     )
 
@@ -105,10 +105,10 @@ class Derivation(Question):
     Attributes
     ----------
     posed : callable
-        Exercise -> Posed.
+        Exercise -> ToDerive.
     """
 
-    posed: Callable[[Exercise], Posed] = field(kw_only=True)
+    posed: Callable[[Exercise], ToDerive] = field(kw_only=True)
 
     def judge(self, exercise: Exercise, text: str) -> Result:
         """Check the text.
@@ -151,7 +151,7 @@ class Derivation(Question):
         return Result(self.name, self.title, WRONG, says, diagnosis, share)
 
 
-def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
+def _read(posed: ToDerive, text: str) -> tuple[Report, Derived]:
     """The report, and the chain that is asked for; Unusable if there is none."""
     text = text.lstrip("\n").rstrip()
     begin = f"begin the first line with `{posed.name} =`, and each further one with `=`"
@@ -204,7 +204,7 @@ def _counted(report: Report, name: str) -> tuple[int, int]:
     return right, steps
 
 
-def _open(posed: Posed, tree: Node | None) -> str:
+def _open(posed: ToDerive, tree: Node | None) -> str:
     """What is still to be done after the last line; nothing if it is an end."""
     if tree is None:
         return "The last line cannot be read."
@@ -219,7 +219,7 @@ def _open(posed: Posed, tree: Node | None) -> str:
     return ""
 
 
-def _is(posed: Posed, tree: Node) -> bool:
+def _is(posed: ToDerive, tree: Node) -> bool:
     """Whether the last line is what the name means, whatever other names were given in the text."""
     try:
         return compare(of_side(posed.setting, posed.name), tree, letter(posed.name)) == EQUAL
@@ -227,7 +227,7 @@ def _is(posed: Posed, tree: Node) -> bool:
         return False
 
 
-def _not_shown(posed: Posed, chain: Derived) -> str:
+def _not_shown(posed: ToDerive, chain: Derived) -> str:
     trees = [verdict.tree for verdict in chain.verdicts if verdict.tree is not None]
     if posed.averages and not any(map(has_mean, trees)):
         return "But a derivation is asked for: begin with a mean M[...], and take a step a line."

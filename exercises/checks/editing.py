@@ -166,7 +166,7 @@ def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast
             yield "order", value
         case ast.Call(func=function, args=[first, second], keywords=[]):
             yield "order", ast.Call(function, [second, first], [])
-        case ast.Call(args=[only], keywords=[]):
+        case ast.Call(args=[only], keywords=[]) if not isinstance(only, ast.Starred):
             yield "function-lost", only
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             for other in (value + 1, value - 1, 2 * value):

@@ -284,7 +284,7 @@ def factor_or_term(case: Case) -> Said | None:
                 return name, f"It is right but for a {name} that {which}."
         return None
     if all(b.size > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
-        return "term", "It is right but for a term that is one number for all that a call gives."
+        return "term", "It is right but for a term that is one number for the whole result."
     a, b = case.numbers
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)

@@ -25,7 +25,7 @@ class State(NamedTuple):
         Estimate z (runs, n) and its error covariance as the filter sees it, (..., n, n).
     predicted : Gaussian
         Prediction lambda (runs, n) of the next state, and Psi (..., n, n).  The exact filter goes
-        without: NaN, and `predictions` finds them by a step without measurement.
+        without: NaN, and `ahead` finds them.
     memory : object
         What else the filter remembers (grid, particles); None for most.
     expected : Measurement, optional
@@ -106,6 +106,14 @@ class Filter:
             object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
 
 
+def ahead(filter_: Filter, state: State) -> Gaussian:
+    """What a filter predicts, by a step without measurement where its state does not tell."""
+    if not np.isnan(state.predicted.mean).all():
+        return state.predicted
+    nothing = np.full((len(state.posterior.mean), filter_.model.p), np.nan)
+    return filter_.step(state, nothing).posterior
+
+
 def structure_of(filter_: Filter, what: str) -> Structure:
     """The structural functions of a filter; ValueError that tells what needs them if it has
     none."""
@@ -117,15 +125,6 @@ def structure_of(filter_: Filter, what: str) -> Structure:
             "aof(unscented(model)) or kalman_filter(model)"
         )
     return filter_.structure
-
-
-def unknown_error(filter_: Filter) -> ValueError:
-    """What is raised where a filter is asked how far its laws are from the true ones, and cannot
-    tell."""
-    return ValueError(
-        f"{filter_.name} does not know how good its laws are: ask pointmass(model), which is "
-        "exact, or particle(model)"
-    )
 
 
 def _on_circle(step: Advance, angles: Components) -> Advance:

@@ -2,6 +2,10 @@
 need.
 
 x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
+
+A scalar meter whose noise enters nonlinearly but can be solved for, such as y = exp(x + w), has
+with w = omega(x, y) the density p(y | x) = phi(omega(x, y)) |d omega / dy|, phi that of N(m_w,
+D_w): the exact filter takes it.
 """
 
 from __future__ import annotations
@@ -22,6 +26,8 @@ from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 # states on which formulas are tried; eigenvalue of correlations that is none
 TRIALS, ROUNDING = 50, 1e-12
+DIGITS = 1e-6  # of a noise's deviation, to which a solution must give the noise back
+Y = sp.Dummy("y", real=True)
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 REMEDY = "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
 
@@ -32,7 +38,11 @@ LogLikelihood: TypeAlias = Callable[..., Array]
 
 class ScalarFormulas(NamedTuple):
     """Means and deviations of the next state and of the measurement, given x: formulas of x and
-    parameters."""
+    parameters.
+
+    Of a meter whose noise is solved for, those of y with ln p(y | x) = -(y - mean)^2 / (2
+    deviation^2) - ln(sqrt(2 pi) deviation): they contain y, the symbol `Y`.
+    """
 
     mean: sp.Expr
     deviation: sp.Expr
@@ -52,6 +62,10 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
     mean, variance = _law(
         model, "object", model.difference_equation("a density"), model.v, model.state_noise
     )
+    if omega := noise_of_meter(model):
+        z = (omega - model.meter_noise.mean[0]) / sp.Float(np.sqrt(model.meter_noise.cov[0, 0]))
+        deviation = 1 / sp.Abs(z.diff(Y))
+        return ScalarFormulas(mean[0], sp.sqrt(variance[0]), Y - z * deviation, deviation)
     meter, meter_variance = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
     return ScalarFormulas(mean[0], sp.sqrt(variance[0]), meter[0], sp.sqrt(meter_variance[0]))
 
@@ -132,13 +146,47 @@ def _singular(law: Stepwise, model: Model) -> bool:
     """Whether the covariance is singular at all states tried: the determinant of long formulas
     takes SymPy minutes."""
     with np.errstate(all="ignore"):
-        away = np.random.default_rng(0).standard_normal((TRIALS, model.n))
-        states = model.prior.mean + away * np.sqrt(np.diagonal(model.prior.cov))
-        cov = law.at(0)(states)[1]
+        cov = law.at(0)(_states(model))[1]
         deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
         correlation = cov / (deviation[..., :, None] * deviation[..., None, :])
     good = np.isfinite(correlation).all(axis=(-2, -1))
     return not (np.linalg.eigvalsh(correlation[good])[..., 0] > ROUNDING).any()
+
+
+def _states(model: Model) -> Array:
+    away = np.random.default_rng(0).standard_normal((TRIALS, model.n))
+    return model.prior.mean + away * np.sqrt(np.diagonal(model.prior.cov))
+
+
+def noise_of_meter(model: Model) -> sp.Expr | None:
+    """omega(x, Y), the noise of a scalar meter in which it enters nonlinearly; None if it is linear
+    or not to be had.
+
+    SymPy solves; which of its solutions is the noise, trials tell.
+    """
+    if model.p != 1 or len(model.w) != 1 or model.timed or model.angles.y:
+        return None
+    w, equation = model.w[0], model.meter_equation[0].subs(model.values)
+    deviation = float(np.sqrt(model.meter_noise.cov[0, 0]))
+    if not (equation.diff(w).has(w) and deviation > 0):
+        return None
+    try:
+        solutions = sp.solve(equation - Y, w)
+    except NotImplementedError:
+        return None
+    states = _states(model).T
+    noises = model.meter_noise.mean + deviation * np.random.default_rng(1).standard_normal(TRIALS)
+    for solution in solutions:
+        try:
+            with np.errstate(all="ignore"):
+                y = sp.lambdify([*model.x, w], equation)(*states, noises)
+                back = sp.lambdify([*model.x, Y], solution)(*states, y)
+        # a solution that cannot be computed, such as Lambert's function
+        except (NameError, TypeError):
+            continue
+        if not solution.has(sp.I) and np.all(np.abs(back - noises) <= DIGITS * deviation):
+            return solution
+    return None
 
 
 def has_object_noise(model: Model) -> bool:

@@ -26,7 +26,7 @@ import numpy as np
 import scipy
 
 from kfcourse.errors import expect, expect_sizes
-from kfcourse.filters.base import Filter, State, structure_of
+from kfcourse.filters.base import Filter, State, ahead, structure_of
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -136,7 +136,8 @@ def gated(
     def judged(state: State, y: Array) -> tuple[Measurement, Array, Array, Array]:
         """What was expected; squares of innovations, gamma, whether they are beyond and the track
         not lost: (runs, p or 1)."""
-        expected = expecting.at(state.step).measure(*state.predicted)
+        law = ahead(filter_, state._replace(memory=state.memory.inner))
+        expected = expecting.at(state.step).measure(*law)
         if by_component:
             variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
             size, limit = expected.innovation(y) ** 2 / variances, limits[[1]]

@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from kfcourse.angles import difference, near
 from kfcourse.errors import NotFinite, Reason, Refused, expect, expect_sizes
-from kfcourse.filters.base import Filter, State
+from kfcourse.filters.base import Filter, State, ahead
 from kfcourse.filters.designed import Design
 from kfcourse.filters.looking_back import looked_back
 from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
@@ -81,14 +81,7 @@ def predictions(filter_: Filter, y: Array) -> Gaussian:
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    y = measurements(filter_, y)
-    nothing = np.full(y.shape[1:], np.nan)
-
-    def ahead(state: State) -> Gaussian:
-        known = not np.isnan(state.predicted.mean).all()
-        return state.predicted if known else filter_.step(state, nothing).posterior
-
-    return stacked([ahead(state) for state in walk(filter_, y)][:-1])
+    return stacked([ahead(filter_, state) for state in walk(filter_, y)][:-1])
 
 
 def states(filter_: Filter, y: Array) -> list[State]:

@@ -193,8 +193,7 @@ def _checked(
     if not names or len(set(names)) < len(names) or not set(names) <= set(model.parameters):
         raise ModelError(
             f"unknown must name parameters of the model, each once: it has "
-            f"{', '.join(model.parameters) or 'none'}; "
-            f"got {', '.join(names) or 'none'}"
+            f"{', '.join(model.parameters) or 'none'}; got {', '.join(names) or 'none'}"
         )
     if not set(positive) <= set(names):
         raise ModelError(

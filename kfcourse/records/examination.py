@@ -159,8 +159,7 @@ def _noise_of(cov: Array, scale: Array, what: str) -> None:
     variance, whole = (np.diagonal(matrix, axis1=-2, axis2=-1) for matrix in (cov, scale))
     if (variance < -1e-6 * np.abs(whole)).any():
         raise ValueError(
-            f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the "
-            f"inputs there"
+            f"{what} has a negative variance, {variance.min():g}: look at its formula and inputs"
         )
 
 

@@ -36,6 +36,7 @@ UNEVEN = 0.01  # intervals that differ by more than this part of their median ar
 DATE = r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d"
 # What to do about a cell that is no number, by the first pattern that is found in it.
 ADVICE = {
+    r"^(?=.*\.)(?=.*,)[-+.,\d]+$": "a point and a comma: nothing may stand between thousands",
     DATE: "a date or a clock's time: write seconds, such as "
     "datetime.fromisoformat(...).timestamp() gives, of UTC, which has no hour twice",
     "\u2212": "its sign is a typographic minus (U+2212): write the hyphen, -",
@@ -185,8 +186,9 @@ class _Table(NamedTuple):
                 values[k] = float(cell or "nan")
             except ValueError:
                 advice = next(text for sign, text in ADVICE.items() if re.search(sign, cell))
-                problem = f"expected a number or nothing, got {shown(cell)}; {advice}"
-                raise self.error(k, column, problem) from None
+                raise self.error(
+                    k, column, f"expected a number or nothing, got {shown(cell)}; {advice}"
+                ) from None
             if np.isinf(values[k]):
                 raise self.error(k, column, f"{shown(cell)} is beyond numbers of double precision")
         return values
@@ -223,7 +225,9 @@ def _table(path: Path) -> _Table:
                 f"{len(table.names)} columns; delete what stands above the names, separate cells "
                 "by commas, or by semicolons if commas separate decimals"
             )
-        table.rows.append([cell.replace(",", ".") for cell in row] if delimiter == ";" else row)
+        if delimiter == ";":  # a comma may stand before decimals
+            row = [re.sub(r"^([^.,]*),([^.,]*)$", r"\1.\2", cell) for cell in row]
+        table.rows.append(row)
         table.lines.append(number)
     if not table.rows:
         raise RecordError(
@@ -267,9 +271,10 @@ def _times(table: _Table, times: Array, column: str) -> Array:
         raise table.error(int(np.argmax(empty)), column, "empty; every row needs its time")
     if (back := np.diff(times) < 0).any():
         k = int(np.argmax(back))
-        problem = (
+        raise table.error(
+            k + 1,
+            column,
             f"{times[k + 1]:.16g} comes after {times[k]:.16g}; sort the rows by time, but where a "
-            "clock was set back write times that only grow, such as UTC"
+            "clock was set back write times that only grow, such as UTC",
         )
-        raise table.error(k + 1, column, problem)
     return times

@@ -148,6 +148,7 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
         (GOOD.replace("0.5,", "2014-03-26T10:00:00Z,"), "line 3, column time: .*a date or a "
 "clock's time: write seconds"),
         (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
+        ("time;y1;y2;a\n0;1,5;1.234,5;1\n", r"column y2: .* got '1\.234,5'; a point and a comma"),
         (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2, column y1: .* got 'm'; if this is a line of "
 "units, delete it"),
         (GOOD.replace(",", " "), "it has 'time y1 y2 a'; commas, tabs or semicolons separate"),

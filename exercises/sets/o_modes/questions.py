@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kfcourse.exercises.checks.derived import Derivation, Posed
+from kfcourse.exercises.checks.derived import Derivation, ToDerive
 from kfcourse.exercises.checks.exercises import Exercise
 from kfcourse.exercises.checks.question import ForVariant, Question
 from kfcourse.exercises.checks.registry import ExerciseSet
@@ -172,7 +172,7 @@ QUESTIONS = (
         ForVariant(lambda e: lambda: SPREAD, "derivation"),
         lambda e: [()],
         advice="Collect what multiplies z1^2, and then what multiplies z1*z2.",
-        posed=lambda e: Posed(spread_setting(), "W", GIVEN, averages=False, fewest=4),
+        posed=lambda e: ToDerive(spread_setting(), "W", GIVEN, averages=False, fewest=4),
     ),
     Question(
         "o6",

@@ -28,7 +28,7 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from kfcourse.files import save
-from kfcourse.filters.densities import scalar_formulas
+from kfcourse.filters.densities import Y, scalar_formulas
 from kfcourse.laws import Array
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -74,7 +74,7 @@ def printed(model: Model | JumpModel) -> str:
         """Symbols that are called as the next entries of c."""
         return {letter: _real(f"c[{next(entries)}]") for letter in letters}
 
-    fixed = {modes[0].x[0]: _real("x[i]")}
+    fixed = {modes[0].x[0]: _real("x[i]"), Y: _real("y")}
     of_modes = [fixed | names([*mode.values, *mode.known.symbols]) for mode in modes]
     for j, (mode, own) in enumerate(zip(modes, of_modes, strict=True)):
         mean, deviation, meter, meter_deviation = (

@@ -486,7 +486,7 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
     for p in range(n):
         low, high = min(low, P[p, LEFT]), max(high, P[p, RIGHT])
         likeliest = p if P[p, BOUND] > P[likeliest, BOUND] else likeliest
-    integral = mean = variance = error = origin = 0.0
+    integral = mean = variance = error = origin = stride = 0.0
     for _ in range(TURNS):
         for i in range(n):
             p = (i + likeliest) % n
@@ -507,6 +507,17 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
             if n > PANELS - 4:
                 return PANELLED, 0
             left, right = P[p, LEFT], P[p, RIGHT]
+            # far where the density still rises; else by one panel, then by twice as much, since a
+            # panel far too long would count as mass
+            further = 2 * (high - low) if p == likeliest else max(2 * stride, right - left)
+            if left == low and P[p, 0] > peak - GOES_ON:
+                stride, low = further, left - further
+                new(P, n, low, left)
+                n += 1
+            if right == high and P[p, Q - 1] > peak - GOES_ON:
+                stride, high = further, right + further
+                new(P, n, right, high)
+                n += 1
             far = max(abs(left - origin - mean), abs(right - origin - mean))
             share = P[p, SHARE] * (1 + far * far / variance)
             rough = share * max(P[p, LOG_ROUGH], P[p, ROUGH])
@@ -516,15 +527,6 @@ def corrected(model, room, y, n, total, later, accuracy, lost, beyond, numbers):
                 n += 1
                 continue
             error += 0.25 * share * (P[p, LOG_ROUGH] + P[p, ROUGH])
-            size = 2 * (high - low)
-            if left == low and P[p, 0] > peak - GOES_ON:
-                low = left - size
-                new(P, n, low, left)
-                n += 1
-            if right == high and P[p, Q - 1] > peak - GOES_ON:
-                high = right + size
-                new(P, n, right, high)
-                n += 1
         if n == before:
             break
     else:
@@ -625,7 +627,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
             if weight_law < 0:
                 model.law(weight_law, Q, 0.0, model.constants, x, weight, s)
             model.law(model.moves, Q, 0.0, model.constants, x, m, s)
-            share, covered, least, calm, steep = 0.0, 0.0, np.inf, np.inf, False
+            share, given, covered, least, calm, steep = 0.0, 0.0, 0.0, np.inf, np.inf, False
             for i in range(Q):
                 covered, calm = max(covered, abs(m[i] - m[0])), min(calm, s[i])
                 slope[i] = 0.0
@@ -639,8 +641,10 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                     value = value_at(power, 0.5 * (a + b) + part * POINT[i])
                 x[i] = value + top + shift + length + LN_WEIGHT[i]
             for i in range(Q):
-                mass[i] = density(x[i]) * weight[i]
+                mass[i] = density(x[i])
                 share += mass[i]
+                mass[i] *= weight[i]
+                given += mass[i]
             for i in range(Q):
                 t = 0.5 * (a + b) + part * POINT[i]
                 blur = abs(slope[i]) / (part * size) * between(before, after, t)
@@ -651,6 +655,8 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 least = min(least, deviation[i])
             digits = 10 * ROUNDING * abs(m[0])
             rough = max(unresolved(m) + unresolved(s) - digits, 0.0) / least
+            if weight_law < 0:
+                rough += unresolved(weight)
             # a measurement may ask for what has little share
             gaps = (
                 covered > span * least
@@ -679,7 +685,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                     low = min(low, m[i] - sqrt(reach) * wide)
                     high = max(high, m[i] + sqrt(reach) * wide)
             count += 1
-            whole += share
+            whole += given
             error += share * rough
             if a == -1:
                 edge[many] = m[0], 0.0, deviation[0]

@@ -131,9 +131,9 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
     Parameters
     ----------
     model : Model or JumpModel
-        One state, one measurement, noises entering linearly (with any functions of x as factors).
-        Of a model with modes, all of which are such, `state.memory.probability` are their posterior
-        probabilities.
+        One state, one measurement, noises entering linearly (with any functions of x as factors);
+        the meter's may be one that can be solved for, as in y = exp(x + w).  Of a model with modes,
+        all of which are such, `state.memory.probability` are their posterior probabilities.
         An object in continuous time is followed by sub-steps (`kfcourse.continuous.exact`).
     accuracy : float
         Error of a step's mean and deviation, in posterior deviations, at most.

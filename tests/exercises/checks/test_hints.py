@@ -120,7 +120,7 @@ WRONG = [
     (of_many(np.exp), lambda a: np.exp(2 * a), "square", "of what it should be, as a"),
     (CEILING, lambda a, n: np.ceil(3 * a), "unused", ""),
     (LAW, lambda *values: np.round(of_law(*values), 2), "precision", "rounded"),
-    (LAW, lambda a, *rest: of_law(a, *rest) - a[0], "term", "one number for all"),
+    (LAW, lambda a, *rest: of_law(a, *rest) - a[0], "term", "one number for the whole"),
     (
         formulas(lambda z, p: c**2 * p + e**2 * (1 + sp.cos(2 * z)) / 2),
         lambda z, p: c**2 * p + e**2 * sp.cos(z) ** 2 + sp.exp(c * e * p * z),
