@@ -3,14 +3,11 @@ discretisation, python-control."""
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import control
 import numpy as np
 import oracles
 import pytest
-import scipy.integrate
-import scipy.linalg
 import sympy as sp
 from numpy.testing import assert_allclose
 
@@ -18,7 +15,6 @@ from kfcourse import FormulaError, Gaussian, ModelError, NotFinite, linearised, 
 from kfcourse.continuous import (
     ContinuousModel,
     extended_kalman_bucy,
-    filter_equations,
     linear_matrices,
     simulate,
     steady_state,
@@ -200,36 +196,6 @@ def test_the_filter_is_the_page(second):
             D = (M + T * A) @ B @ (M + T * A).T + T * g @ np.array(S_VECTOR) @ g.T / 2
 
 
-def test_the_white_term_has_the_mean_that_ito_s_sense_demands():
-    """Over the white noise of y, (Mean[p'] - p) / T is the rate of dD/dt.
-
-    p' is the covariance after the correction; the mean over the two normal noises is Gauss-Hermite
-    quadrature (9 x 9 points, exact for polynomials of degree 17).  What is left is of the order T:
-    halving T halves it.
-    """
-    model = nonlinear_vector()
-    e = filter_equations(model)
-    at = dict(zip(e.z, model.prior.mean, strict=True)) | {
-        e.D[i, j]: model.prior.cov[i, j] for i in range(2) for j in range(2)
-    }
-    S = np.array(e.S.subs(at | model.values), dtype=float)[:, 0]
-    at |= dict(zip(e.y, S, strict=True)) | model.values
-    D, J = model.prior.cov, -np.array(e.U.subs(at), dtype=float)
-    rate = -D @ J @ D
-    nodes, weights = np.polynomial.hermite_e.hermegauss(9)
-    pairs = np.array([[a, b] for a in nodes for b in nodes])
-    weight = np.array([a * b for a in weights for b in weights]) / weights.sum() ** 2
-    left = []
-    for T in (2e-4, 1e-4):
-        filter_ = extended_kalman_bucy(model, T, True)
-        y = S + pairs @ np.linalg.cholesky(np.array(N_VECTOR) / (2 * T)).T
-        posterior = filter_.step(filter_.init(len(y)), y).posterior
-        left.append(np.abs((np.tensordot(weight, posterior.cov, 1) - D) / T - rate).max())
-        assert np.abs((weight @ posterior.mean - model.prior.mean) / T).max() < 0.01
-    assert left[0] < 0.02 * np.abs(rate).max()
-    assert 1.7 < left[0] / left[1] < 2.3
-
-
 # --- functions of time
 
 
@@ -245,27 +211,6 @@ def varying():
         spectral_density=0.9,
         noise_density=0.4,
     )
-
-
-def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
-    """The scheme's error halves with the step; D itself swings between 0.1 and 0.3 after its start
-    from 2."""
-
-    def rate(t, D):
-        q, H = (0.5 + math.exp(-t)) ** 2 * 0.9 / 2, 1 + 0.8 * math.cos(3 * t)
-        return -2 * (0.7 + math.sin(2 * t)) * D + q - (H * D) ** 2 * 2 / 0.4
-
-    errors = []
-    for T in (0.02, 0.01, 0.005):
-        steps = round(4 / T)
-        D = predictions(extended_kalman_bucy(varying(), T), np.zeros((steps, 1, 1))).cov[:, 0, 0, 0]
-        exact = scipy.integrate.solve_ivp(
-            rate, (0, 4), [2.0], t_eval=T * np.arange(steps), rtol=1e-10, atol=1e-12
-        ).y[0]
-        errors.append(np.abs(D - exact)[round(0.5 / T) :].max())
-    for coarse, half in pairwise(errors):
-        assert 1.6 < coarse / half < 2.4
-    assert errors[-1] < 0.01
 
 
 def test_the_discrete_model_has_its_functions_at_the_times_of_its_steps():

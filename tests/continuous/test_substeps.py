@@ -58,25 +58,6 @@ def agrees(model, y, wanted, accuracy=1e-3, beyond=3e-4):
 Y = np.array([0.4, 1.5, np.nan, -0.2, 3.0])
 
 
-def test_a_cubic_drift_against_finite_volumes():
-    model = sampled("-0.5*x - 0.1*x**3", "1.5", "x + 0.5*x**2 + w", interval=0.5)
-    wanted = finite_volumes(
-        lambda x, t: -0.5 * x - 0.1 * x**3,
-        lambda x: 2.25 + 0 * x,
-        [[(0, 0.5)]] * 4,
-        lambda x: x + 0.5 * x**2,
-        1.0,
-        Y,
-    )
-    stated = agrees(model, Y, wanted)
-    assert stated[-1] < 0.05
-    # what is stated shrinks with what is asked for, and the error with it
-    assert agrees(model, Y, wanted, accuracy=1e-4, beyond=5e-4)[-1] < stated[-1] / 2
-    # and the filter of normal moments is not within it
-    normal = run(aof(gaussian(model)), Y).mean[:, 0, 0]
-    assert (np.abs(normal - wanted[0]) / wanted[1]).max() > 3 * stated[-1]
-
-
 def test_a_noise_that_depends_on_the_state_and_a_drift_on_time():
     instants = [0.0, 0.3, 0.5, 1.1, 1.2]
     model = sampled("-x + 2*cos(3*t)", "1 + 0.4*sin(x)", "x + 0.7*w", instants=instants)

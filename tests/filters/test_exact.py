@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from kfcourse import Model, ModelError, filters, load_variants, run, simulate
+from kfcourse import Gaussian, Model, ModelError, filters, load_variants, run, simulate
 from kfcourse.filters import kalman_filter
 from kfcourse.filters.exact import pointmasses
 from kfcourse.filters.exact.pointmasses import Unresolved
@@ -78,21 +78,15 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(numbers, prior, shif
     y = simulate(model, 8, 6, seed=4).y + shift
     y[2, 3] = np.nan
     exact, kalman = filters.pointmass(model, 1e-5), kalman_filter(model)
-    a, b, total = exact.init(8), kalman.init(8), 0.0
-    for k, measured in enumerate(y):
-        a, b = exact.step(a, measured), kalman.step(b, measured)
-        sd = np.sqrt(b.posterior.cov[..., 0, 0])
-        if sd.min() > 0:  # else a prior without variance, which is one of 1e-7 here
-            allowed = a.memory.error + FLOOR
-            assert (np.abs(a.posterior.mean - b.posterior.mean)[:, 0] <= allowed * sd).all(), k
-            assert (np.abs(np.sqrt(a.posterior.cov[:, 0, 0]) / sd - 1) <= allowed).all(), k
-        total = a.memory.error.max()
-    assert total < 1e-3
-    ours, theirs = predictions(exact, y), predictions(kalman, y)
-    sd = np.sqrt(theirs.cov[1:, :, 0, 0])
-    allowed = total + FLOOR
-    assert (np.abs(ours.mean - theirs.mean)[1:, :, 0] <= allowed * sd).all()
-    assert (np.abs(np.sqrt(ours.cov[1:, :, 0, 0]) / sd - 1) <= allowed).all()
+    *_, stated = followed(model, y, 1e-5)
+    assert stated[-1].max() < 1e-3
+    for laws in (run, predictions):
+        # a prior without variance is one of 1e-7 here
+        ours, right = (Gaussian(*(part[1:] for part in laws(each, y))) for each in (exact, kalman))
+        sd = np.sqrt(ours.cov[..., 0, 0])
+        agrees(
+            (ours.mean[..., 0], sd, stated[1:]), right.mean[..., 0], np.sqrt(right.cov[..., 0, 0])
+        )
 
 
 # --- against other integrations of the same equation
@@ -218,22 +212,6 @@ def test_a_prediction_has_the_moments_of_the_closed_form(state, mean, variance, 
         assert abs(third.posterior.cov[0, 0, 0] / second - 1) <= 2 * allowed
 
 
-def test_a_kernel_that_is_narrow_here_and_folds_there():
-    """x' = 0.9 x + 0.05 x^2 v: narrow near 0, and far out the noise turns f(., v) back.  Against a
-    sum over a million states."""
-    model = Model.define("0.9*x + 0.05*x**2*v", "x + 0.5*w")
-    # The second posterior's moments: x' = f(x, u), over x of the first posterior, N(0.32, 0.2), and
-    # u; trapezoidal in both.
-    x = 0.32 + np.sqrt(0.2) * np.linspace(-9, 9, 2001)[:, None]
-    u = np.linspace(-8, 8, 801)
-    weight = np.exp(-0.5 * ((x - 0.32) ** 2 / 0.2 + u**2))
-    after = 0.9 * x + 0.05 * x**2 * u
-    weight *= np.exp(-0.5 * ((1.3 - after) / 0.5) ** 2)
-    mean = (weight * after).sum() / weight.sum()
-    sd = np.sqrt((weight * (after - mean) ** 2).sum() / weight.sum())
-    agrees([part[1:] for part in followed(model, np.array([[[0.4]], [[1.3]]]))], mean, sd)
-
-
 def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
     """x' = x^(-1/3) + v with the odd root: few of x come to 20, from 1/8000.  Particles have none
     there.
@@ -329,32 +307,9 @@ def test_a_record_that_contradicts_the_model_has_the_right_answer_or_none(y):
         assert y >= -6
 
 
-def test_it_knows_where_a_linear_record_leaves_its_prediction():
-    """Measurements 4 to 11 deviations from where the state was predicted; the Kalman filter has the
-    truth."""
-    model, refused = Model.define("x + 0.1*v", "x + 0.5*w"), []
-    for level in np.arange(2.0, 12.0, 0.5):
-        y = np.array([0.0, 0.0, *4 * [level]])[:, None, None]
-        expected = run(kalman_filter(model), y)
-        try:
-            agrees(
-                followed(model, y, 1e-3),
-                expected.mean[..., 0],
-                np.sqrt(expected.cov[..., 0, 0]),
-                times=3,
-            )
-        except Unresolved:
-            refused.append(level)
-    # beyond a level all, and none before
-    assert refused and refused == list(np.arange(refused[0], 12.0, 0.5))
-    assert 3 <= refused[0] < 8
-
-
-def test_one_trajectory_gives_the_same_numbers_as_many_and_as_in_threads(monkeypatch):
+def test_threads_change_no_number(monkeypatch):
     _, y = simulate(VARIANTS["5"], 150, 5, seed=1)
     together = run(pointmass(VARIANTS["5"]), y)
-    alone = run(pointmass(VARIANTS["5"]), y[:, 140:141])
-    assert np.array_equal(together.mean[:, 140:141], alone.mean)
     for threads in (1, 3):
         monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", threads)
         again = run(pointmass(VARIANTS["5"]), y)
@@ -372,7 +327,7 @@ def test_one_trajectory_gives_the_same_numbers_as_many_and_as_in_threads(monkeyp
         ("x + v**2", "x + w", "noise enters nonlinearly.*gauss_hermite"),
         *(
             ("x + v", meter, "noise enters nonlinearly.*gauss_hermite")
-            for meter in ("x + w**3", "x + w**2", "x + sin(w)", "exp(w*x) + w")
+            for meter in ("x + w**2", "exp(w*x) + w")
         ),
         ("x*exp(v)", "x + w", "noise enters nonlinearly.*gauss_hermite"),
         ("0.9*x + v", "x**2", "no noise enters the meter"),

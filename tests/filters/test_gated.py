@@ -100,17 +100,6 @@ def test_a_right_filter_loses_as_many_as_it_was_told(plane, probability):
     assert not lost[np.isnan(y).all(axis=-1)].any()
 
 
-def test_an_innovation_of_a_turn_is_none():
-    model = Model.define(
-        "x + 0.1*v",
-        "x + 0.2*w",
-        angles={"x": ["x"], "y": ["y"]},
-        prior={"mean": 3.1, "variance": 0.01},
-    )
-    y = np.array([3.1, -3.1, 3.12, 1.0, -3.13])
-    assert_array_equal(weights(gated(aof(linearised(model))), y).ravel(), [1, 1, 1, 0, 1])
-
-
 # ---------------------------------------------------------------- the lost track
 
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 from test_every_filter import LINEAR, exact_ensemble
 from test_multiple_models import follow
@@ -16,7 +16,6 @@ from test_particles import histories
 from kfcourse import (
     Ensemble,
     JumpModel,
-    Model,
     ModelError,
     NotFinite,
     design,
@@ -25,10 +24,8 @@ from kfcourse import (
     linearised,
     run,
     simulate,
-    unscented,
 )
 from kfcourse.filters import (
-    aof,
     gpb2,
     imm,
     kalman_filter,
@@ -144,17 +141,6 @@ def test_a_long_fault_leaves_the_exact_filter_sure_of_itself(name):
 
 
 # --- filters of one law for each mode
-
-
-@pytest.mark.parametrize("build", SEQUENTIAL)
-@pytest.mark.parametrize("kind", [linearised, gaussian, unscented])
-def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
-    model = Model.define("x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w")
-    y = simulate(model, 5, 20, seed=4).y
-    y[3, 0] = np.nan
-    ours, expected = run(build([kind(model)], [[1.0]]), y), run(aof(kind(model)), y)
-    assert_array_equal(ours.mean, expected.mean)
-    assert_array_equal(ours.cov, expected.cov)
 
 
 def test_what_is_merged_when():

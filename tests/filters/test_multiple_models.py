@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_normal
 
-from kfcourse import JumpModel, Model, linearised, run, simulate
+from kfcourse import Model, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic
 from kfcourse.linear.system import linear_system
 from kfcourse.montecarlo.experiment import states
@@ -113,17 +113,10 @@ def test_what_does_not_fit_together_is_refused(change, message):
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
-def test_a_model_that_jumps_gives_the_first_probabilities_too(build):
-    jump = JumpModel.define(
-        "x + v",
-        "x + C*w",
-        modes={"a": {"parameters": {"C": 1}}, "b": {"parameters": {"C": 9}}},
-        transition=[[0.9, 0.1], [0.2, 0.8]],
-        first=[1, 0],
-    )
-    structures = [linearised(mode) for mode in jump.modes]
-    assert_array_equal(build(structures, jump).init(2).memory.probability, [[1, 0]] * 2)
-    assert_array_equal(build(structures, jump.transition_at).init(2).memory.probability, 0.5)
+def test_without_first_probabilities_all_modes_have_the_same(build):
+    """Those of a model that jumps: test_jumps."""
+    filter_ = build([linearised(SCALAR)] * 2, TWO)
+    assert_array_equal(filter_.init(2).memory.probability, 0.5)
 
 
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from test_multiple_models import matrices
 
 from kfcourse import JumpModel, Model, run, simulate
-from kfcourse.filters import kalman_filter, particle
+from kfcourse.filters import particle
 from kfcourse.filters.densities import likelihood
 from kfcourse.lab import find_variant
 from kfcourse.lab.short_names import exact
@@ -20,11 +20,6 @@ from kfcourse.montecarlo.experiment import states
 from kfcourse.records import likelihood as evidence
 
 PARTICLES, REPLICAS = 300, 40  # of a trajectory; how often each is filtered with its own particles
-LINEAR = Model.define(
-    ["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 - 0.1*x1 + 0.3*v2"],
-    ["x1 + 0.5*w1", "x2 + 0.3*x1 + 0.6*w2 + 0.2*w1"],
-    prior={"mean": [1.0, -1.0], "variance": [[0.5, 0.1], [0.1, 0.4]]},
-)
 
 
 def moving(modes):
@@ -113,16 +108,6 @@ def test_of_a_scalar_model_it_is_the_exact_filter(name):
     agree(own, variance, variance)
     if name.startswith("J"):
         agree(probability, np.array([state.memory.probability for state in right]), 0.5)
-
-
-def test_of_a_linear_vector_model_it_is_the_kalman_filter():
-    _, y = simulate(LINEAR, 2, 6, seed=3)
-    y[1, :, 0] = y[2, 1, 1] = y[4] = np.nan  # one of two measured, the other, none
-    expected = run(kalman_filter(LINEAR), y)
-    variance = np.diagonal(expected.cov, axis1=-2, axis2=-1)
-    mean, own, *_ = replicas(LINEAR, y, range(6))
-    agree(mean, expected.mean, np.sqrt(variance))
-    agree(own, variance, variance)
 
 
 @pytest.mark.parametrize("model", [THROWN, FAULTY], ids=["both change", "meters"])

@@ -15,7 +15,6 @@ from kfcourse import (
     ModelError,
     NoClosedForm,
     design,
-    gauss_hermite,
     gaussian,
     linearised,
     run,
@@ -223,7 +222,6 @@ def test_functions_of_a_model_with_time_want_the_step():
         (np.zeros((1, 1)), np.ones((1, 1, 1))),
     )
     for use in (
-        lambda: linearised(model).predict(*law),
         lambda: linearised(model).measure(*law),
         lambda: compile_model(model)[0](*np.zeros((2, 1, 1))),
         lambda: compile_noiseless(model)[0](np.zeros((1, 1))),
@@ -278,15 +276,3 @@ def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
     else:
         with pytest.raises(ModelError):
             pointmass(model)
-    x, y = simulate(model, 20_000, 2, seed=1)
-    # the error of a rule at a jump is the weight of a point, 0.05 at most here; of the sample, 0.05
-    structure = gauss_hermite(model, 60)
-    tau, theta = structure.predict(*model.prior)
-    h, _, F, _ = structure.measure(*model.prior)
-    for moment, sample in (
-        (tau, x[1].mean()),
-        (theta, x[1].var()),
-        (h, y[0].mean()),
-        (F, y[0].var()),
-    ):
-        assert np.squeeze(moment) == pytest.approx(sample, abs=0.15)

@@ -26,7 +26,6 @@ from kfcourse.lab.quality import (
     table,
 )
 from kfcourse.lab.variants import STEPS
-from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo import BATCHES, FEWEST
 from kfcourse.montecarlo.statistics import Sums
 
@@ -212,19 +211,6 @@ def test_the_share_of_a_linear_variant_is_that_of_the_riccati_equation():
     1.4 % at a step, and at some ten independent steps."""
     share = examine(SHIPPED["1"], 10_000).findings["observable"].value
     assert share == pytest.approx(riccati(STEPS), rel=4 * np.sqrt(2 / 10_000 / 10))
-
-
-def test_linear_is_linear_in_state_and_noise():
-    assert is_linear(SHIPPED["1"].model)
-    assert is_linear(Model.define(["x1 + 0.1*x2 + v1", "x2"], ["(x1 + 1)**2 - x1**2 + w1"]))
-    for state, meter in (
-        ("x*v", "x + w"),
-        ("x + v", "x + x*w"),
-        ("x + v", "sin(x) + w"),
-        ("x + v**2", "x + w"),
-    ):
-        assert not is_linear(Model.define(state, meter))
-    assert is_linear(Model.define("x + c*x**2 + v", "x + w", {"c": 0}))
 
 
 # --- the table

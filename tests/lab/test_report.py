@@ -575,15 +575,6 @@ def test_hostile_names_stay_text(results, no_figures, tmp_path):
     )
 
 
-def test_only_what_was_compared_is_explained(no_figures, tmp_path):
-    result = compared(VARIANTS["53"].model, ["aof-linearised"], 200, 3)
-    write_report(VARIANTS["53"], result, tmp_path)
-    html = page_of(tmp_path)
-    assert "Linearised" in html
-    assert "<h3>Gaussian</h3>" not in html
-    assert "DUOF, the two-step" not in html
-
-
 def test_the_numbers_are_those_of_the_comparison(results, tmp_path):
     data, without = (
         json.loads(page_of(write_json(VARIANTS[name], results[name], tmp_path / name).parent, name))

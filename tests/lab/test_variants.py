@@ -69,26 +69,6 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
 # --- files of variants
 
 
-def test_all_keys_of_a_vector_variant_are_read(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        '[variants.v]\ntitle = "two"\nstate = ["a + k*b", "b + q"]\nmeter = ["a + r"]\nparameters '
-        "= { k = 0.1 }\n"
-        'symbols = { x = ["a", "b"], v = ["q"], w = ["r"] }\nprior = { mean = [1, 2], variance = '
-        "[[2, 1], [1, 3]] }\n"
-        "state_noise = { variance = 0.25 }\nmeter_noise = { mean = 0.5, variance = 4 }\nangles = "
-        "['y']\n",
-        encoding="utf-8",
-    )
-    model = find_variant("v", path).model
-    assert (model.n, model.p) == (2, 1)
-    assert model.prior.mean.tolist() == [1, 2]
-    assert model.prior.cov.tolist() == [[2, 1], [1, 3]]
-    assert model.state_noise.cov.tolist() == [[0.25]]
-    assert model.angles.y == (0,)
-    assert (model.meter_noise.mean.tolist(), model.meter_noise.cov.tolist()) == ([0.5], [[4.0]])
-
-
 BAD_VARIANTS = {  # more that a model refuses: test_model, test_formula
     "no state": ('meter = "x + w"', "no state"),
     "unknown key": (GOOD + "speed = 1", "unknown key speed"),

@@ -7,8 +7,7 @@ import scipy.linalg
 import scipy.stats
 from numpy.testing import assert_allclose
 
-from kfcourse import Gaussian, Model, linearised, predictions, simulate
-from kfcourse.filters import kalman_filter
+from kfcourse import Gaussian
 from kfcourse.laws import normalised_square
 from kfcourse.linear.consistency import (
     Innovations,
@@ -16,37 +15,11 @@ from kfcourse.linear.consistency import (
     autocorrelation,
     chi_squared_bounds,
     confidence_ellipse,
-    innovations,
     nees,
     nis,
 )
-from kfcourse.linear.system import linear_system
 
 pytestmark = pytest.mark.quick
-
-RUNS, STEPS = 2000, 12
-
-
-def tracking(**noise) -> Model:
-    """Two components, two correlated measurements, noises with means; `noise` scales the two
-    standard deviations."""
-    return Model.define(
-        ["x1 + 0.5*x2 + 0.2*q*v1", "0.9*x2 + 0.3*q*v2"],
-        ["x1 + r*w1", "x2 - x1 + 0.5*r*w2"],
-        {"q": 1, "r": 1} | noise,
-        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
-        state_noise={"mean": [0.1, 0], "variance": [[1, 0.3], [0.3, 2]]},
-        meter_noise={"mean": [0, 0.4], "variance": [[1, 0.6], [0.6, 2]]},
-    )
-
-
-@pytest.fixture(scope="module")
-def paths():
-    return simulate(tracking(), RUNS, STEPS, seed=5)
-
-
-def innovations_of(model, y) -> Innovations:
-    return innovations(linearised(model).measure, predictions(kalman_filter(model), y), y)
 
 
 # ---------------------------------------------------------------- quantities
@@ -68,26 +41,6 @@ def test_the_normalised_square_is_the_loop_of_the_page():
     )
     assert_allclose(nees(vector, Gaussian(0.5 * vector, cov)), np.array(expected) / 4, rtol=1e-12)
     assert_allclose(nis(Innovations(vector, cov)), expected, rtol=1e-12)
-
-
-def test_innovations_are_measurements_less_predictions(paths):
-    model = tracking()
-    system, _, offset = linear_system(model)
-    predicted = predictions(kalman_filter(model), paths.y)
-    value, cov = innovations_of(model, paths.y)
-    for k, i in ((0, 0), (3, 17), (STEPS - 1, RUNS - 1)):
-        P = predicted.cov[k, i]
-        assert_allclose(
-            value[k, i],
-            paths.y[k, i] - system.H @ predicted.mean[k, i] - offset,
-            rtol=1e-12,
-            atol=1e-12,
-        )
-        assert_allclose(
-            np.broadcast_to(cov, (STEPS, RUNS, 2, 2))[k, i],
-            system.H @ P @ system.H.T + system.R,
-            rtol=1e-12,
-        )
 
 
 # ---------------------------------------------------------------- autocorrelation

@@ -31,13 +31,6 @@ def two_states():
     return LinearSystem(system.A, system.H, np.diag([2.0, 1.0]), np.array([[3.0]])), prior, y
 
 
-def test_no_round_lowers_the_likelihood():
-    start, prior, y = two_states()
-    heights = np.array([log_density(system, prior, y) for system in em_rounds(start, prior, y, 12)])
-    assert (np.diff(heights) > 0).all()
-    assert heights[-1] - heights[0] > 10
-
-
 def test_each_round_climbs_in_the_direction_of_the_gradient():
     """The first round's change and the likelihood's slope along it have a known relation: M[ln p(x,
     y)] has the same slope."""

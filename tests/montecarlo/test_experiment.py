@@ -13,7 +13,6 @@ from kfcourse import (
     Model,
     NotFinite,
     compare,
-    design,
     gaussian,
     likelihood,
     linearised,
@@ -52,16 +51,6 @@ def vector():
 
 
 # ---------------------------------------------------------------- simulation
-
-
-def test_the_seed_decides_the_trajectories(variant53):
-    first, again, other = (
-        simulate(variant53, 50, 7, 1),
-        simulate(variant53, 50, 7, 1),
-        simulate(variant53, 50, 7, 2),
-    )
-    assert_array_equal(first.y, again.y)
-    assert not np.isin(first.x[0], other.x[0]).any()
 
 
 def test_ensembles_side_by_side_are_those_alone(variant53):
@@ -242,16 +231,6 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
         for use in (run, predictions, smooth, likelihood):
             with pytest.raises(ValueError, match=message):
                 use(filter_, measurements)
-
-
-def test_a_design_that_is_run_says_what_to_do(variant53):
-    y = simulate(variant53, 2, 3, seed=1).y
-    with pytest.raises(
-        TypeError, match=r"got Design duof: .*design\(\.\.\.\) makes one of a design"
-    ):
-        run(duof(variant53), y)
-    each = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
-    assert np.isfinite(run(each, y).mean).all()
 
 
 def test_each_batch_of_a_comparison_has_particles_of_its_own(vector):

@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from kfcourse import Model, ModelError, linearised, simulate
 from kfcourse.filters import aof
 from kfcourse.records import estimate, profile
-from kfcourse.records.estimation import _inverse
 from kfcourse.scenarios.benchmarks import local_level, nile
 
 pytestmark = pytest.mark.quick
@@ -43,23 +42,6 @@ def test_a_variance_alone_has_its_closed_form():
     assert estimated.standard_error[0] == pytest.approx(expected * np.sqrt(2 / 198), rel=1e-5)
 
 
-@pytest.mark.parametrize("start", [1.0, 3.0])
-def test_a_direction_that_is_not_told_is_named_whole(start):
-    """g of any sign and a positive q: only g^2 q reaches the measurements, and neither gets a
-    finite error."""
-    model = Model.define(
-        "0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0}
-    )
-    y = simulate(model, 1, 30, seed=1).y
-    estimated = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
-    assert (
-        len(estimated.flat) == 1
-        and "does not tell g (" in estimated.flat[0]
-        and ", q (" in estimated.flat[0]
-    )
-    assert np.isinf(estimated.standard_error).all()
-
-
 def test_what_the_record_does_not_tell_is_named():
     """Only the product of g and s reaches the measurements: one doubled and the other halved,
     nothing changes."""
@@ -81,22 +63,6 @@ def test_what_the_record_does_not_tell_is_named():
     assert alone.flat == ()
     assert estimated.value[0] * estimated.value[1] == pytest.approx(1.5 * alone.value[0], rel=1e-4)
     assert estimated.standard_error[2] == pytest.approx(alone.standard_error[1], rel=1e-3)
-
-
-def test_how_little_information_is_none():
-    """Of a parameter; of a direction in units of their errors; of a component of a direction."""
-    for own, blind in ((0.008, True), (0.012, False)):
-        variance, flat = _inverse(np.diag([own, 1.0]), np.ones(2), "ab", 0.0)
-        assert np.isinf(variance).tolist() == [blind, False] and bool(flat) == blind
-    for left, blind in ((0.8e-5, True), (1.2e-5, False)):
-        variance, _ = _inverse(np.array([[1, 1 - left], [1 - left, 1]]), np.ones(2), "ab", 0.0)
-        assert np.isinf(variance).all() == blind
-    for part, named in ((0.008, False), (0.012, True)):
-        c = np.sqrt(2) * part  # b is a and c of c: the direction is (1, -1, c) / sqrt(2)
-        root = np.array([[1, 0], [1, c] / np.hypot(1, c), [0, 1]])
-        variance, (sentence,) = _inverse(root @ root.T, np.ones(3), "abc", 0.0)
-        assert np.isinf(variance).tolist() == [True, True, named]
-        assert (", c (" in sentence) == named
 
 
 def test_a_profile_is_the_best_over_the_others():

@@ -6,7 +6,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import (
@@ -106,17 +105,6 @@ def test_measurements_that_cannot_be_are_refused(sigmas, runs, message):
 
 
 # --- models and errors
-
-
-def test_matrices_of_the_kinematic_models():
-    T, q, r = 0.7, 3.0, 20.0
-    system, _, _ = linear_system(kinematic(T, dimensions=2, noise_sd=q, measurement_sd=r))
-    g = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
-    assert_allclose(system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15)
-    assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
-    assert_allclose(system.R, r**2 * np.eye(2), rtol=1e-15)
-    assert_array_equal(system.H, np.eye(2, 4))
-    assert [s.name for s in kinematic(T).x] == ["x", "y", "z", "vx", "vy", "vz"]
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ import scipy.linalg
 from numpy.testing import assert_allclose
 
 from kfcourse import Gaussian
-from kfcourse.linear.consistency import nees
 from kfcourse.scenarios.navigation import (
     Clock,
     Dynamics,
@@ -251,22 +250,6 @@ def test_late_measurements_are_used_as_on_the_page(with_inputs):
 
 
 # ---------------------------------------------------------------- fusion: nonlinear sensors
-
-
-def test_the_covariance_is_right_by_tag_and_wrong_by_arrival():
-    """Three sensors, one nonlinear, late and on clocks of their own: mean NEES 2 over independent
-    runs."""
-    runs = 1000
-    sensors = [
-        *two_sensors(latency=0.8, clock=Clock(1.01, 0.2)),
-        Sensor.define("range", STATES, "sqrt(s**2 + 900) + w", 0.1, 0.3),
-    ]
-    x, messages = measured(sensors, 6.0, runs, [6.5], 10)
-    by_tag = nees(x, fuse(FREE, sensors, PRIOR, messages, [6.5]))
-    # four standard errors of a chi-squared mean: sqrt(2 * 2 / runs)
-    assert abs(by_tag.mean() - 2) < 4 * np.sqrt(4 / runs)
-    by_arrival = nees(x, fuse(FREE, sensors, PRIOR, messages, [6.5], by="arrival"))
-    assert by_arrival.mean() > 2 + 10 * np.sqrt(4 / runs)
 
 
 # ---------------------------------------------------------------- fusion: what it refuses

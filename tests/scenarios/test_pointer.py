@@ -34,17 +34,6 @@ def test_the_matrices_are_those_of_the_radar_and_the_input_pushes_as_the_noise(a
 # ---------------------------------------------------------------- start-up
 
 
-def test_the_start_up_is_the_parabola_through_three_samples():
-    rng, dt = np.random.default_rng(1), 0.3
-    y = rng.normal(size=(3, 5, 2))
-    law = start_up(y, dt, np.eye(2))
-    t = dt * np.array([-2, -1, 0])  # the last sample at 0
-    for run in range(5):
-        for axis in range(2):
-            c2, c1, c0 = np.polyfit(t, y[:, run, axis], 2)
-            assert_allclose(law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11)
-
-
 # ---------------------------------------------------------------- the filter
 
 

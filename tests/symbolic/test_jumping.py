@@ -130,14 +130,12 @@ def test_averaged_equations():
             r"at step 0: \[nan, nan\] are no probabilities",
         ),
         ({"transition": [[1.0]]}, "must be 2 rows of 2 probabilities for 2 mode"),
-        ({"transition": "0.9"}, "must be 2 rows of 2 probabilities"),
         ({"transition": [[0.9, 0.1], 0.3]}, "must be 2 rows of 2 probabilities"),
         (
             {"transition": [[0.9, True], [0.3, 0.7]]},
             "^`transition`: an entry = True: expected a finite number",
         ),
         ({"first": [0.8, 0.3]}, r"`first`: \[0.8, 0.3\] are no probabilities"),
-        ({"first": [1.0]}, r"`first` must be probabilities of the shape \(2,\)"),
         ({"first": None}, r"`first` must be probabilities of the shape .* mode\(s\); got None"),
         ({"modes": {}}, "`modes` has no mode"),
         (

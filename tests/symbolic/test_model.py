@@ -7,18 +7,9 @@ import sympy as sp
 from kfcourse import FormulaError, Model, ModelError, NoClosedForm, gaussian, linearised
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import nothing_random
 
 pytestmark = pytest.mark.quick
-
-
-def test_a_model_keeps_its_formulas_symbolic_and_its_parameters_exact(variant53):
-    x, v, w, c, e, g, f = (symbol(name) for name in "xvwcegf")
-    assert variant53.state_equation[0] == c * x + e * x * v
-    assert variant53.meter_equation[0] == g * x + f * x**2 * w
-    assert variant53.parameters["e"] == sp.Rational(1, 20)
-    assert (variant53.n, variant53.p) == (1, 1)
 
 
 def test_strings_expressions_and_matrices_give_the_same_model():
@@ -26,26 +17,6 @@ def test_strings_expressions_and_matrices_give_the_same_model():
     by_string = Model.define("x/2 + v*x", "x**3 + w")
     assert by_string == Model.define(x / 2 + v * x, x**3 + w)
     assert by_string == Model.define(sp.ImmutableMatrix([x / 2 + v * x]), [x**3 + w])
-
-
-def test_laws_are_standard_normal_by_default():
-    model = Model.define(["x1 + v1", "x2 + v2"], ["x1 + w1"])
-    for law, size in ((model.prior, 2), (model.state_noise, 2), (model.meter_noise, 1)):
-        assert np.array_equal(law.mean, np.zeros(size))
-        assert np.array_equal(law.cov, np.eye(size))
-
-
-def test_a_variance_is_a_number_a_list_or_a_matrix():
-    for variance, expected in (
-        (2, [[2, 0], [0, 2]]),
-        ([2, 3], [[2, 0], [0, 3]]),
-        ([[2, 1], [1, 3]], [[2, 1], [1, 3]]),
-    ):
-        model = Model.define(
-            ["x1 + v", "x2"], "x1 + w", prior={"mean": [1, 2], "variance": variance}
-        )
-        assert np.array_equal(model.prior.cov, expected)
-        assert np.array_equal(model.prior.mean, [1, 2])
 
 
 @pytest.mark.parametrize(

@@ -43,30 +43,6 @@ def test_a_known_state_has_no_part_in_the_unexplained(kind):
         state = filter_.step(state, y)
 
 
-@pytest.mark.parametrize("kind", [linearised, gaussian, unscented, gauss_hermite])
-@pytest.mark.parametrize("slopes", [(1, 1), (1, 0.3), (0.7, -0.21)])
-def test_two_collinear_exact_meters_of_a_constant_state(kind, slopes):
-    """y = (s^T x, 2 s^T x), no noises, prior variance 1e8: s^T x is known after a step, and later
-    measurements tell nothing."""
-    a, b = slopes
-    model = Model.define(
-        ["x1", "x2"],
-        [f"{a}*x1 + {b}*x2", f"{2 * a}*x1 + {2 * b}*x2"],
-        prior={"mean": [0, 0], "variance": [1e8, 1e8]},
-    )
-    x, y = simulate(model, 200, 20, seed=2)
-    estimates = run(aof(kind(model)), y)
-    left = 1e8 * (np.eye(2) - np.outer(slopes, slopes) / np.dot(slopes, slopes))
-    assert_allclose(
-        np.broadcast_to(estimates.cov, (20, 200, 2, 2)),
-        np.broadcast_to(left, (20, 200, 2, 2)),
-        atol=1.0,
-    )
-    nees = ((x - estimates.mean) ** 2)[-1].mean(axis=0) / np.diagonal(left)
-    # of 200 squares of standard normal numbers
-    assert (np.abs(nees - 1) < 4 * np.sqrt(2 / 200)).all()
-
-
 @pytest.mark.parametrize("kind", [unscented, gauss_hermite])
 @pytest.mark.parametrize("units", [(1.0, 1.0), (1e-6, 1e9)])
 def test_slopes_are_seen_in_directions_without_variance(kind, units):

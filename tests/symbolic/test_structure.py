@@ -239,26 +239,3 @@ def test_an_exponential_of_a_large_constant_is_not_torn_apart():
 def test_what_is_no_rule_of_points_is_refused(variant53, build, problem):
     with pytest.raises(ModelError, match=problem):
         build(variant53)
-
-
-@pytest.mark.parametrize("derive", [linearised, gaussian])
-def test_models_that_differ_in_a_number_only_are_not_taken_for_each_other(derive, variant53):
-    """What is derived for one is used for the other: formulas for other parameters, and nothing for
-    other noises."""
-    z, p = np.array([[1.2]]), np.array([[[0.3]]])
-    noisier = Model.define(
-        "c*x + e*x*v",
-        "g*x + f*x**2*w",
-        dict(variant53.parameters),
-        state_noise={"variance": 4},
-        meter_noise={"variance": 4},
-    )
-    computed = []
-    for model in (variant53, variant53.replace(e=0.1, f=0.04), noisier, variant53):
-        structure = derive(model)
-        assert structure.model is model
-        computed.append((structure.predict(z, p).cov, structure.measure(z, p).R))
-    first, doubled, other, again = computed
-    # e v with twice the e, or four times the variance
-    assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)
-    assert np.array_equal(first, again) and not np.allclose(first, doubled)

@@ -10,7 +10,7 @@ from tiny import FORMULA, SUM, about, asks, c, d, outcome, p, raises, x, y, z
 
 from kfcourse.exercises.checks.engine import check
 from kfcourse.exercises.checks.equality import Unusable, equal, equal_formulas, like
-from kfcourse.exercises.checks.question import MIME, ForVariant, Mistake, Question, catalogue
+from kfcourse.exercises.checks.question import MIME, Question, catalogue
 
 pytestmark = pytest.mark.quick
 
@@ -60,25 +60,6 @@ def test_parameters_have_the_sign_of_their_values():
     assert check(question, exercise, lambda a: sp.Abs(c) * a).status == "wrong"
     # a symbol of the student's own, by its name
     assert check(question, exercise, lambda a: sp.symbols("c") * a).passed
-
-
-def test_a_known_mistake_is_named_and_its_message_shown():
-    known = (
-        ("once", "b enters twice", lambda a, b: a + b),
-        ("minus", "the sign of b", lambda a, b: a - 2 * b),
-    )
-
-    def impossible(exercise):
-        raise IndexError
-
-    # one that the variant does not allow is left out
-    mistakes = [Mistake("no", "no", ForVariant(impossible)), *catalogue(known)]
-    question = asks(SUM.key, SUM.arguments(None), mistakes)
-    result = outcome(question, lambda a, b: b + a)
-    assert (result.status, result.diagnosis) == ("wrong", ("once",))
-    assert "b enters twice" in result.message
-    assert outcome(question, lambda a, b: a - b - b).diagnosis == ("minus",)
-    assert "does not look like" in outcome(question, lambda a, b: a * b).message
 
 
 def test_parts_are_told_apart():

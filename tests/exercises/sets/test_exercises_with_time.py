@@ -51,16 +51,6 @@ def test_a_wrong_step_is_named(name, question):
 k, u, c, q, r, e = sp.symbols("k u c q r e", real=True)
 
 
-def growth(mean):
-    """The linearised growth model with another mean."""
-
-    def answer(z, p):
-        slope = sp.Rational(1, 2) + 25 * (1 - z**2) / (1 + z**2) ** 2
-        return mean(z / 2 + 25 * z / (1 + z**2)), slope**2 * p + 10
-
-    return answer
-
-
 def switched(mean):
     return lambda z, p: (c * z + r * z**2 + mean, (c + 2 * r * z) ** 2 * p + e**2)
 

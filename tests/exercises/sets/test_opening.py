@@ -1,7 +1,6 @@
 """Opening a set for a variant, and what is said if there is none."""
 
 import pytest
-import sympy as sp
 
 from kfcourse.exercises.checks import ExerciseError, exercise
 from kfcourse.lab import VariantError
@@ -20,11 +19,3 @@ def test_no_such_set_question_or_variant():
         exercise("a", {"state": "x +", "meter": "x + w"})
     with pytest.raises(VariantError, match="variant J1 jumps between modes"):
         exercise("r", "J1")  # its questions do not use the model, its checks do
-
-
-def test_a_variant_of_ones_own():
-    lab = exercise(
-        "a", {"name": "mine", "state": "q*x + v", "meter": "x + w", "parameters": {"q": 0.5}}
-    )
-    q = sp.Symbol("q", real=True)
-    assert lab.check("a2", lambda z, p: (q * z, q**2 * p + 1)).passed

@@ -6,7 +6,6 @@ import pytest
 import sympy as sp
 from numpy import matrix_transpose as T
 from scipy.integrate import quad
-from sympy import cos, sin
 
 from kfcourse.exercises.checks import exercise
 
@@ -17,99 +16,12 @@ GENERATED = {
     "parameters": {"c": 0.83, "r": 0.86, "e": 0.24, "g": 0.9, "q": 0.39, "f": 0.33},
     "prior": {"mean": 0.0, "variance": 0.75},
 }
-c, e, g, f, r, q, mu, z1, z2, p1, p2 = sp.symbols("c e g f r q mu z1 z2 p1 p2", real=True)
+c, e, g, f, r, q = sp.symbols("c e g f r q", real=True)
 
 
-def gain(Psi, G, F):
-    return Psi @ T(G) @ np.linalg.inv(F)
-
-
-def times(matrix, vector):
-    return (matrix @ vector[..., None])[..., 0]
-
-
-def joseph(Psi, G, F, R):
-    K = gain(Psi, G, F)
-    rest = np.eye(Psi.shape[-1]) - K @ G
-    return rest @ Psi @ T(rest) + K @ R @ T(K)
-
-
-def correction(covariance):
-    def answer(lam, Psi, h, G, F, y):
-        K = gain(Psi, G, F)
-        return lam + times(K, y - h), covariance(Psi, K, G, F)
-
-    return answer
-
-
-def centred(target, regressor):
-    r_, t = regressor - regressor.mean(axis=0), target - target.mean(axis=0)
-    B = np.linalg.lstsq(r_, t, rcond=None)[0].T
-    return (
-        B,
-        target.mean(axis=0) - B @ regressor.mean(axis=0),
-        (t - r_ @ B.T).T @ (t - r_ @ B.T) / len(t),
-    )
-
-
-def designed(start=lambda mean: mean):
-    def answer(x, y_design, y, mean, a, b):
-        lam, mine = np.tile(start(mean), (x.shape[1], 1)), np.tile(start(mean), (y.shape[1], 1))
-        estimates = []
-        for k in range(len(x)):
-            omega = y_design[k] - b(lam)
-            H, shift, _ = centred(x[k] - lam, omega)
-            z = lam + omega @ H.T + shift
-            estimates.append(mine + (y[k] - b(mine)) @ H.T + shift)
-            if k + 1 < len(x):
-                F, shift, _ = centred(x[k + 1], a(z))
-                lam, mine = a(z) @ F.T + shift, a(estimates[-1]) @ F.T + shift
-        return np.array(estimates)
-
-    return answer
-
-
-def nees_per_component(x, z, p):
-    return np.einsum("kni,knij,knj->k", x - z, np.linalg.inv(p), x - z) / x.shape[1] / x.shape[2]
-
-
-def f2_by_logarithms(predicted, y, x, see):
-    mean, variance = see(x)
-    exponent = -0.5 * (y - mean) ** 2 / variance - 0.5 * np.log(2 * np.pi * variance)
-    scaled = np.exp(exponent - exponent.max()) * predicted
-    mass = np.trapezoid(scaled, x)
-    return scaled / mass, mass * np.exp(exponent.max())
-
-
-def h4_solved(a, s, h, S_xi, N):
-    D = sp.Symbol("D", positive=True)
-    roots = sp.solve(-2 * a * D + s**2 * S_xi / 2 - D**2 * h**2 * 2 / N, D)
-    D = next(root for root in roots if root.subs({a: 1, s: 1, h: 1, S_xi: 1, N: 1}) > 0)
-    return D, 2 * D * h / N
-
-
-def i3_solved(y0, y1, y2, dt):
-    r, v, a = sp.symbols("r v a")
-    equations = [r - v * k * dt + a * (k * dt) ** 2 / 2 - y for k, y in ((0, y2), (1, y1), (2, y0))]
-    solved = sp.solve(equations, [r, v, a])
-    return solved[r], solved[v], solved[a]
-
-
-def j1_by_rotations(r, phi, eps):
-    up = sp.Matrix([[cos(eps), 0, -sin(eps)], [0, 1, 0], [sin(eps), 0, cos(eps)]])
-    about = sp.Matrix([[cos(phi), -sin(phi), 0], [sin(phi), cos(phi), 0], [0, 0, 1]])
-    return tuple(about * up * sp.Matrix([r, 0, 0]))
-
-
-def j5_solved(a, T, alpha, beta):
-    e, d = sp.symbols("e d")
-    before = e + T * d + a * T**2 / 2
-    solved = sp.solve([before * (1 - alpha) - e, d + a * T - beta / T * before - d], [e, d])
-    return solved[e], solved[d]
-
-
-def j6_closed(alpha, beta):
-    return (2 * alpha**2 + beta * (2 - 3 * alpha)) / (alpha * (4 - 2 * alpha - beta))
+def without_joseph(lam, Psi, h, G, F, y):
+    K = Psi @ T(G) @ np.linalg.inv(F)
+    return lam + (K @ (y - h)[..., None])[..., 0], Psi - K @ G @ Psi
 
 
 def one_time(variance, q):
@@ -123,17 +35,8 @@ def one_time(variance, q):
 
 
 RIGHT = [
-    ("a1", "53", lambda z: sp.Matrix([c, e * z])),
     ("a2", "53", lambda z, p: [[c * z], [(c * sp.sqrt(p)) ** 2 + (e * z) ** 2]]),
-    ("a2", "53", lambda z, p: [z * c, p * c**2 + (e * z) ** 2]),
-    (
-        "a3",
-        "5",
-        lambda m, d: (g * sp.sin(m), g * sp.cos(m), g**2 * (1 - sp.sin(m) ** 2) * d + f**2),
-    ),
     ("a3", "20", lambda m, d: ([m[0]], [1, 0], [[d[0, 0] + r**2]])),
-    ("a4", "53", lambda z, p: (c * z, p * (c**2 + e**2) + e**2 * z**2)),
-    ("a5", "53", lambda m, d: (g * m, g, g**2 * d + f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2))),
     (
         "a5",
         "generated",
@@ -143,7 +46,6 @@ RIGHT = [
             (g + 2 * q * m) ** 2 * d + 2 * (q * d) ** 2 + f**2,
         ),
     ),
-    ("a6", "20", lambda m, d: sp.Matrix([[r**2]])),
     ("a6", "53", lambda m, d: f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2)),
     (
         "a7",
@@ -161,7 +63,6 @@ RIGHT = [
             "3*d)^2 - 6*d^2)  # done"
         ),
     ),
-    ("b1", "53", lambda Psi, G, F: T(np.linalg.solve(F, G @ Psi))),
     (
         "b1",
         "20",
@@ -169,29 +70,16 @@ RIGHT = [
             (P @ H.T @ np.linalg.pinv(V)).tolist() for P, H, V in zip(Psi, G, F, strict=True)
         ],
     ),
-    ("b2", "53", correction(lambda Psi, K, G, F: Psi - K @ F @ T(K))),
     # the state's components differ by a factor of a thousand: an inverse keeps its digits all the
     # same
-    ("b2", "D3", correction(lambda Psi, K, G, F: Psi - K @ G @ Psi)),
+    ("b2", "D3", without_joseph),
     (
         "b5",
         "5",
         lambda Psi, G, F, R: np.linalg.inv(np.linalg.inv(Psi) + T(G) @ np.linalg.inv(R) @ G),
     ),
-    ("b5", "20", joseph),
-    ("c2", "generated", centred),
-    ("c4", "53", designed()),
-    ("c4", "53", designed(lambda mean: 0 * mean)),  # the offset makes it good, at every step
-    ("e5", "53", nees_per_component),
     ("m2", "53", lambda nu, F: -sp.log(sp.sqrt(2 * sp.pi * F)) - (nu / sp.sqrt(F)) ** 2 / 2),
-    ("r4", "53", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * np.pi * T)),
     ("r5", "53", lambda variance, q: np.array([one_time(s, q) for s in variance])),
-    ("f2", "53", f2_by_logarithms),
-    ("h4", "53", h4_solved),
-    ("i3", "53", i3_solved),
-    ("j1", "53", j1_by_rotations),
-    ("j5", "53", j5_solved),
-    ("j6", "53", j6_closed),
 ]
 
 
