@@ -1,4 +1,5 @@
-"""What a comparison reports: against direct per-trajectory formulas and theory."""
+"""What a comparison reports: against direct per-trajectory formulas, theory, and the page's
+table."""
 
 import re
 from dataclasses import replace
@@ -10,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
 from kfcourse import Comparison, Ensemble, Gaussian, Model, compare, gaussian, linearised, run
-from kfcourse.filters import aof, duof, kalman_filter, particle, pointmass
+from kfcourse.filters import aof, duof, fos, kalman_filter, mfos, particle, pointmass
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.ensemble import side_by_side, stratified, weights
 from kfcourse.montecarlo.experiment import batch_sizes
@@ -383,6 +384,79 @@ def test_where_all_errors_are_zero_filters_are_equal(variant53):
     for square, rounded in ((1.5e-28, True), (3e-28, False)):
         result = by_hand(variant53, {"aof-gaussian": np.full(4, square)})
         assert result.without_error.all() == rounded
+
+
+@pytest.mark.slow
+def test_intervals_cover_the_truth_as_often_as_they_say(linear):
+    """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors
+    around 190."""
+    single = kalman_filter(linear)
+    truth = float(np.trace(single.step(single.init(1), np.zeros((1, 2))).posterior.cov))
+    hits = 0
+    for seed in range(200):
+        low, high = (
+            compare([single], linear, 400, 1, seed, jobs=1).error_variance("kalman").interval(0.95)
+        )
+        hits += bool(low[0] < truth < high[0])
+    assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
+
+
+# ---------------------------------------------------------------- the table of the page
+
+COLUMNS = (
+    "aof-gaussian",
+    "aof-linearised",
+    "duof",
+    "fos-gaussian",
+    "fos-linearised",
+    "mfos-gaussian",
+    "mfos-linearised",
+)
+PAGE = {  # D_k x 10^4, last digit
+    1: ((6.506, 6.572, 6.478, 6.507, 6.486, 6.435, 6.424), 0.001),
+    2: ((4.238, 4.240, 4.466, 4.333, 4.321, 4.298, 4.293), 0.001),
+    3: ((2.853, 2.853, 3.018, 2.903, 2.897, 2.888, 2.885), 0.001),
+    5: ((1.349, 1.350, 1.422, 1.360, 1.359, 1.358, 1.357), 0.001),
+    10: ((0.1977, 0.1977, 0.2042, 0.1979, 0.1979, 0.1979, 0.1979), 0.0001),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def repeated(variant53):
+    """Error variances (repeats, filters, steps) in eight independent comparisons, each with a
+    design of its own, that together are as large as the page's, of 10^6 trajectories."""
+    structures = gaussian(variant53), linearised(variant53)
+    filters = [
+        *(aof(structure) for structure in structures),
+        duof(variant53),
+        *(family(structure) for family in (fos, mfos) for structure in structures),
+    ]
+    results = (
+        compare(filters, variant53, 125_000, 11, seed, same_ensemble=True) for seed in range(8)
+    )
+    return np.array([[each.error_variance(name).value for name in COLUMNS] for each in results])
+
+
+@pytest.mark.slow  # the golden comparison of variant 53 is the same with 20,000 trajectories
+@pytest.mark.parametrize("k", PAGE)
+def test_the_table_of_the_page_is_reproduced(repeated, k):
+    """Variances, and their ratios to the Gaussian AOF's, which common trajectories tell far better.
+
+    Their error is taken from the scatter of the comparisons: a standard error from one holds for
+    the filters as designed there.
+    """
+    printed, digit = np.array(PAGE[k][0]), PAGE[k][1]
+    variances = 1e4 * repeated[:, :, k]
+    # Our mean and the page's run have the same size, so the same error; Student's quantile of 4
+    # sigma for 8 runs.
+    quantile = stats.t.isf(stats.norm.sf(SIGMA), 7)
+    ratios, expected = variances / variances[:, :1], printed / printed[0]
+    for sample, value, rounding in (
+        (variances, printed, 0.5 * digit),
+        (ratios, expected, 0.5 * digit / printed[0] * (1 + expected)),
+    ):
+        error = np.sqrt(2) * sample.std(axis=0, ddof=1) / np.sqrt(8)
+        assert (abs(sample.mean(axis=0) - value) < quantile * error + rounding).all()
 
 
 def test_a_printed_comparison_says_what_to_ask(variant53):
