@@ -210,9 +210,9 @@ class Comparison:
         Rare trajectories carry a gap that has become small, a sample may lack them, and then its
         scatter does not show them.  So nothing is said of a single step more finely than to
         `RESOLUTION`: a 95 % interval has a thousandth of the bound to each side.  Of variant 53
-        these intervals hold true gaps and differences in 99 % of the cases, and in 93 % at the
-        worst step; those of `mean_gap` hold 97 % (20,000 trajectories, 37 seeds,
-        `benchmarks/intervals.py`).
+        these intervals hold true gaps and differences in 99 % of the cases, and in 85 % at the
+        worst step of the worst filter; those of `mean_gap` hold 95 % (20,000 trajectories, 200
+        seeds, `benchmarks/intervals.py`).
         """
         return self._resolved(Estimate.jackknife(self._gap(name)), 1.0)
 
