@@ -142,6 +142,8 @@ ON_POINTS = {
     ("x - 0.5*sign(x) + v", "x + w"): MIDPOINTS,  # dry friction
     ("0.9*x + (1 if x < 0 else 2)*v", "x + w"): MIDPOINTS,
     ("0.9*x + v", "2*sign(x) + w"): MIDPOINTS,
+    # far out many turns of the sine are possible, and panels must not go there
+    ("0.93*x - 0.021*x**3 + 0.21*v", "1.4*sin(x) + 0.63*w"): FINE,
 }
 
 
