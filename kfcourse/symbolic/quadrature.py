@@ -32,8 +32,8 @@ from kfcourse.laws import (
     transpose,
 )
 from kfcourse.symbolic.choices import decides
+from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 from kfcourse.symbolic.structure import Structure, of_steps
@@ -145,7 +145,7 @@ class _Side(NamedTuple):
     function: Callable[..., Array]
     mean: Array  # of all noises
     root: Array  # of the covariance of the noises with points, columns for them only
-    factors: Stepwise  # B D B^T of those without points
+    factors: Compiled  # B D B^T of those without points
     angles: Components  # components of the function's value
     size: int
     points: Array = np.empty((0, 0))
@@ -159,7 +159,7 @@ class _Side(NamedTuple):
     def added(self, x: Array, k: int | None) -> Array:
         """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given
         x."""
-        covs = self.factors.at(k)(x)[0]
+        covs = self.factors(x, k=k)[0]
         if covs.ndim > 2:
             covs = np.einsum("q,...qij->...ij", self.weights, covs)
         return symmetric(covs)
@@ -232,9 +232,9 @@ def _side(
     for _ in noises:  # and what is correlated with one of them
         pointed |= (law.cov[:, pointed] != 0).any(axis=1)
     cov = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
-    stepwise = model.compiled([model.x], [factors * cov * factors.T])
+    covariance = model.compiled([model.x], [factors * cov * factors.T])
     root = np.eye(len(noises))[:, pointed] @ square_root(law.cov[np.ix_(pointed, pointed)])
-    return _Side(model, function, law.mean, root, stepwise, angles, len(equation))
+    return _Side(model, function, law.mean, root, covariance, angles, len(equation))
 
 
 def _checked(
