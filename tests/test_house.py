@@ -208,7 +208,7 @@ ROOMS = {
     "kfcourse/filters": 30_830,
     "kfcourse/lab": 19_030,
     "kfcourse/linear": 5_570,
-    "kfcourse/montecarlo": 11_290,
+    "kfcourse/montecarlo": 11_120,
     "kfcourse/pages": 8_120,
     "kfcourse/records": 5_590,
     "kfcourse/scenarios": 9_990,
