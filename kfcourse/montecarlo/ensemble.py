@@ -157,8 +157,8 @@ def stratified(rng: np.random.Generator, runs: int, r: int, wide: float) -> Arra
 
 
 def _advance(model: Model | JumpModel) -> Callable[..., Instant]:
-    """One step of the model: (k, x, mode, standard v, w, u) -> y = b^mode(x, w), the next mode by u,
-    x' = a^next(x, v).  A model that does not jump needs no u, and stays in the mode 0."""
+    """One step of the model: (k, x, mode, standard v, w, u) -> y = b^mode(x, w), the next mode by
+    u, x' = a^next(x, v).  A model that does not jump needs no u, and stays in the mode 0."""
     modes = [(mode, *compile_model(mode)) for mode in modes_of(model)]
     between = modes[0][0].between
 
