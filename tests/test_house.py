@@ -208,12 +208,12 @@ ROOMS = {
     "kfcourse/filters": 30_610,
     "kfcourse/lab": 19_030,
     "kfcourse/linear": 5_570,
-    "kfcourse/montecarlo": 11_120,
+    "kfcourse/montecarlo": 10_860,
     "kfcourse/pages": 8_120,
     "kfcourse/records": 5_560,
     "kfcourse/scenarios": 9_990,
     "kfcourse/symbolic": 20_770,
-    "tests": 172_040,
+    "tests": 172_020,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

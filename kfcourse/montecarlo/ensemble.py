@@ -127,6 +127,15 @@ def foretold(ensemble: Ensemble, k: int, drawn: tuple[Array, Array] | None) -> A
     return advance(k, moved.x_next, moved.mode_next, *now).y
 
 
+def check_finite(k: int, *trajectories: Array) -> None:
+    """NotFinite if these arrays of a step are not all finite."""
+    if not all(np.isfinite(values).all() for values in trajectories):
+        raise NotFinite(
+            f"step {k}: the model's trajectories become infinite, check its equations and "
+            f"parameters"
+        )
+
+
 def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:
     """Prior over the law that `stratified` draws from, at initial states x (N, n): (N,), between 0
     and 2.
