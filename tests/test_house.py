@@ -200,7 +200,7 @@ ROOMS = {
     "exercises/*.py": 830,
     "exercises/checks": 17_600,
     "exercises/derivations": 14_390,
-    "exercises/grading": 17_130,
+    "exercises/grading": 16_720,
     "exercises/notebooks": 7_940,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_220,
