@@ -198,9 +198,9 @@ ROOMS = {
     "benchmarks": 4_930,
     "book": 29_260,
     "exercises/*.py": 830,
-    "exercises/checks": 17_600,
-    "exercises/derivations": 14_390,
-    "exercises/grading": 16_720,
+    "exercises/checks": 17_580,
+    "exercises/derivations": 14_340,
+    "exercises/grading": 16_690,
     "exercises/notebooks": 7_940,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_220,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 5_590,
     "kfcourse/scenarios": 9_990,
     "kfcourse/symbolic": 20_770,
-    "tests": 172_040,
+    "tests": 172_030,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 OURS = Path(kfcourse.__file__).resolve().parent, Path(__file__).resolve().parents[1]
 SECONDS = 20.0  # an answer may take
 DIAGNOSIS = 60.0  # the search for the kind of mistake
+FOLLOWS = "right-on-top-of-an-earlier-wrong-answer"
 
 
 class Missing(Exception):
@@ -256,7 +257,7 @@ class _Check:
                 f"this step is right on top of your {' and '.join(follows)}; what is not right "
                 f"yet is there: look there first."
             )
-            return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
+            return self._says(WRONG, says, diagnosis=(FOLLOWS,), share=share, follows=follows)
         message, names, explained = wrong.description()
         advice = self.question.advice if times else ""
         example = not explained or times > bool(self.question.advice)

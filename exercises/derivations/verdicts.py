@@ -55,10 +55,8 @@ class Verdict:
     kinds : tuple of str
         Of slips that explain a line that differs; more than one only if two explain it equally
         well.
-    terms : tuple of str
-        The terms that they name.
     spans : tuple of pairs
-        Where these stand in the text; none for a term of the line above.
+        Where the terms stand in the text that they name; none for a term of the line above.
     rule : str
         Which the right step uses.
     tree : Node, optional
@@ -71,7 +69,6 @@ class Verdict:
     status: str
     says: str = ""
     kinds: tuple[str, ...] = ()
-    terms: tuple[str, ...] = ()
     spans: tuple[tuple[int, int], ...] = ()
     rule: str = ""
     tree: Node | None = None
@@ -262,15 +259,12 @@ class _Chain:
             self._says(link, DIFFERS, says, node, kinds=("positive",))
             return broken or link.line
         slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
-        descriptions = [
+        words = " or ".join(
             described(self.setting, slip, link.text, node, above, previous) for slip in slips
-        ]
-        words = " or ".join(words for words, _ in descriptions)
+        )
         places = [at(node, named(node, slip.path)).span for slip in slips if not slip.above]
         says = (
-            f"the line differs from {where}: {words}"
-            if descriptions
-            else UNEXPLAINED.format(above=where)
+            f"the line differs from {where}: {words}" if words else UNEXPLAINED.format(above=where)
         )
         self._says(
             link,
@@ -278,7 +272,6 @@ class _Chain:
             says,
             node,
             kinds=tuple(slip.kind for slip in slips),
-            terms=tuple(term for _, term in descriptions),
             spans=tuple(place for place in places if place),
             rule=rule(self.setting, slips[0] if slips else None, node, previous, name),
         )

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from kfcourse.exercises.checks import Question, Result, sets
-from kfcourse.exercises.checks.hints import OF_RESULT
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.exercises.notebooks.texts import write_csv
 from kfcourse.files import save
@@ -75,11 +74,8 @@ class Grade:
 
 
 def in_words(question: Question, name: str) -> str:
-    """What is said of a known mistake, or of what is known of any result; of others the name tells
-    it."""
-    says = {code: sentence for code, sentence, _ in OF_RESULT}
-    says |= {mistake.name: mistake.says for mistake in question.mistakes}
-    says["follows"] = "right on top of an earlier wrong answer"
+    """What is said of a known mistake; of others the name tells it."""
+    says = {mistake.name: mistake.says for mistake in question.mistakes}
     return says.get(name, name.replace("-", " ")).partition(". ")[0].rstrip(".")
 
 
