@@ -3,14 +3,12 @@ overview."""
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
-import markupsafe
 
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WEIGHTS, WRONG
@@ -31,7 +29,7 @@ from kfcourse.exercises.grading.weights import (
     worth,
 )
 from kfcourse.exercises.notebooks.course_list import Student
-from kfcourse.exercises.notebooks.texts import write_csv
+from kfcourse.exercises.notebooks.texts import coded, write_csv
 from kfcourse.files import save
 
 KINDS = {
@@ -205,10 +203,5 @@ def overview(
 def _page(name: str, **values: Any) -> str:
     loader = jinja2.PackageLoader("kfcourse.exercises.notebooks")
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
-    environment.filters["coded"] = _coded
+    environment.filters["coded"] = coded
     return environment.get_template(f"{name}.html.j2").render(**values)
-
-
-def _coded(text: str) -> markupsafe.Markup:
-    """What stands in backquotes as code."""
-    return markupsafe.Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(markupsafe.escape(text))))
