@@ -251,18 +251,17 @@ class _Check:
     def _wrong(self, answered: list[Any]) -> Result:
         times, follows = self._times(answered), self._follows(answered)
         wrong = Wrong(self.posed, self.answer, answered)
-        share = sum(wrong.right) / len(wrong.right) if wrong.right else 0.0
         if follows:
             says = (
                 f"this step is right on top of your {' and '.join(follows)}; what is not right "
                 f"yet is there: look there first."
             )
-            return self._says(WRONG, says, diagnosis=(FOLLOWS,), share=share, follows=follows)
+            return self._says(WRONG, says, diagnosis=(FOLLOWS,), share=wrong.share, follows=follows)
         message, names, explained = wrong.description()
         advice = self.question.advice if times else ""
         example = not explained or times > bool(self.question.advice)
         message = " ".join(filter(None, [message, advice, wrong.example() if example else ""]))
-        return self._says(WRONG, message, diagnosis=tuple(names), share=share)
+        return self._says(WRONG, message, diagnosis=tuple(names), share=wrong.share)
 
     def _times(self, answered: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""
