@@ -3,6 +3,10 @@ would be right."""
 
 from __future__ import annotations
 
+import re
+
+from markupsafe import Markup, escape
+
 from kfcourse.exercises.derivations.setting import Setting
 from kfcourse.exercises.derivations.slips import Slip, named, term_path
 from kfcourse.exercises.derivations.terms import (
@@ -55,6 +59,11 @@ UNEXPLAINED = (
     "It is not equal to {above}, and no single change explains it: was more than one "
     "step taken at once?"
 )
+
+
+def coded(text: str) -> Markup:
+    """A text in HTML: what stands in backquotes is code."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def shown(text: str, node: Node) -> str:

@@ -12,6 +12,7 @@ import jinja2
 
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WEIGHTS, WRONG
+from kfcourse.exercises.derivations.wording import coded
 from kfcourse.exercises.grading.owners import Person, known_sets, people, same_code
 from kfcourse.exercises.grading.results import (
     NOT_GRADED,
@@ -29,7 +30,7 @@ from kfcourse.exercises.grading.weights import (
     worth,
 )
 from kfcourse.exercises.notebooks.course_list import Student
-from kfcourse.exercises.notebooks.texts import coded, write_csv
+from kfcourse.exercises.notebooks.texts import write_csv
 from kfcourse.files import save
 
 KINDS = {
@@ -151,9 +152,9 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
     parts = []
     for letter in letters:
         grade = person.grades.get(letter)
-        rows = [
+        rows = grade and [
             (question, grade.results[question.name], worth(grade, question, credit))
-            for question in (sets()[letter].questions if grade else ())
+            for question in sets()[letter].questions
         ]
         got = points([grade] if grade else [], credit)
         parts.append((sets()[letter], grade, rows, got, possible([letter])))

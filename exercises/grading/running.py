@@ -148,7 +148,7 @@ class Kernel:
         Missing, Unusable, OutOfTime
             As an answer that is called here would make `call` of checks/engine.py say; the last
             with the seconds.
-        Killed
+        Stopped
         """
         functions: list[Callable] = []
 
@@ -170,10 +170,6 @@ class Kernel:
             raise OutOfTime(seconds) from None
         except ProtocolError as reason:
             raise Unusable(f"returns what cannot be read: {clean(str(reason))}") from None
-        except Killed:
-            raise
-        except Stopped as reason:
-            raise Unusable(str(reason)) from None
         fails = reply.get("fails")
         if fails == "missing":
             raise Missing

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup, escape
-
 from kfcourse.files import save
 
 FORMULA = ("=", "+", "-", "@")  # full-width ones are taken for these
@@ -44,11 +42,6 @@ def clean(text: str, length: int = 200) -> str:
     line = "".join(c if c.isprintable() else " " for c in text)
     line = " ".join(line.split())
     return line if len(line) <= length else line[: length - 1] + "…"
-
-
-def coded(text: str) -> Markup:
-    """A text in HTML: what stands in backquotes is code."""
-    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def write_csv(columns: Sequence[str], rows: Iterable[Mapping[str, Any]], path: Path) -> None:

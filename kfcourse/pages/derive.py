@@ -12,8 +12,7 @@ from markupsafe import Markup
 
 from kfcourse.exercises.derivations import Report, check_text
 from kfcourse.exercises.derivations.verdicts import MARKS, Verdict
-from kfcourse.exercises.derivations.wording import DEFINITIONS, RULES
-from kfcourse.exercises.notebooks.texts import coded
+from kfcourse.exercises.derivations.wording import DEFINITIONS, RULES, coded
 from kfcourse.lab.variants import Variant, find_variant
 
 SCRIPT = Path(__file__).parent / "data" / "derive.js"

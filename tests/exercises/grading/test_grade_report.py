@@ -30,17 +30,17 @@ SIGN = next(
 EVERYTHING = [question.name for question in sets()["b"].questions]
 
 
-def said(mark, message="", diagnosis=(), **more):
+def outcome(mark, message="", diagnosis=(), **more):
     return Result("", "", mark, message, diagnosis, **more)
 
 
 def wrong(message="no", *diagnosis, **more):
-    return said(WRONG, message, diagnosis, **more)
+    return outcome(WRONG, message, diagnosis, **more)
 
 
 def graded(name, letter="b", variant="53", passed=(), student="", work="w", looks=(), **wrong):
-    results = {question.name: said(NOT_RUN) for question in sets()[letter].questions}
-    results |= dict.fromkeys(passed, said(PASSED)) | wrong
+    results = {question.name: outcome(NOT_RUN) for question in sets()[letter].questions}
+    results |= dict.fromkeys(passed, outcome(PASSED)) | wrong
     return Grade(name, "graded", letter, variant, results, (), looks, name, student, work)
 
 
@@ -76,7 +76,7 @@ def test_what_to_look_at():
         graded("РТ-1/Петрова Анна/c.ipynb", "c", variant="20", passed=["c1"], work="y"),
         graded("РТ-1/Петрова Анна/c (1).ipynb", "c", variant="20", passed=["c1", "c2"], work="z"),
         Grade("РТ-2/Иванов Иван/b.ipynb", "not graded", notes=("it killed its process",)),
-        Grade("РТ-2/Иванов Иван/c.ipynb", "graded", "c", results={"c1": said(MISSING)}),
+        Grade("РТ-2/Иванов Иван/c.ipynb", "graded", "c", results={"c1": outcome(MISSING)}),
         Grade("x.ipynb", "not graded", notes=("not JSON",)),
         Grade("notes.ipynb", "not an exercise notebook"),
     ]
@@ -111,7 +111,7 @@ def test_without_a_list_a_folder_is_a_student():
 def test_points_are_the_weights_of_the_levels():
     assert possible("abc") == sum(possible("abc", level) for level in WEIGHTS)
     assert points([graded("x", passed=EVERYTHING)], USUAL) == possible("b")
-    grade = graded("x", passed=EVERYTHING, b1=wrong(), b2=said(UNUSABLE))
+    grade = graded("x", passed=EVERYTHING, b1=wrong(), b2=outcome(UNUSABLE))
     assert points([grade], USUAL) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
 
 
@@ -141,7 +141,7 @@ def test_what_a_wrong_answer_is_worth_is_the_teachers_choice(credit, expected):
     assert (row["set b"], row["points"], row["of"]) == (total, total, possible("b"))
     half = f"{credit.parts * 2 / 3:.2f}".rstrip("0").rstrip(".")
     assert f"{half}/2" in feedback(Person(IVANOV, {"b": grade}), "b", credit)
-    unusable = replace(grade, results=dict.fromkeys(grade.results, said(UNUSABLE, share=0.5)))
+    unusable = replace(grade, results=dict.fromkeys(grade.results, outcome(UNUSABLE, share=0.5)))
     assert points([unusable], credit) == 0  # only what is wrong has right parts
 
 
