@@ -205,7 +205,7 @@ ROOMS = {
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_220,
     "kfcourse/continuous": 9_840,
-    "kfcourse/filters": 30_830,
+    "kfcourse/filters": 30_710,
     "kfcourse/lab": 19_030,
     "kfcourse/linear": 5_570,
     "kfcourse/montecarlo": 11_290,
