@@ -249,8 +249,7 @@ def context(exercise: Exercise) -> dict[str, Any]:
 
 
 def known_values(model: Model) -> list[str]:
-    """An `aligned` block with the time and the first values of the inputs; none if the equations
-    have neither."""
+    """An `aligned` block with the time; none if the equations do not contain it."""
     lines = model.known.latex() if model.timed else []
     return ["\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"] if lines else []
 

@@ -176,7 +176,7 @@ def sampled(
     symbols: Mapping[str, Names] | None = None,
     prior: Mapping[str, Any] | None = None,
     meter_noise: Mapping[str, Any] | None = None,
-    angles: Names | Mapping[str, Names] | None = None,
+    angles: Names | None = None,
     inputs: Mapping[str, Sequence[float]] | None = None,
     interval: float = 1,
     instants: Sequence[float] | None = None,
@@ -217,7 +217,7 @@ def sampled(
     ...     "-a*x", "s*x", "x + w", dict(a=0.5, s=1), instants=[0, 0.3, 1.7], stratonovich=True
     ... )
     >>> model
-    Model(dx/dt = -a*x + s**2*x/2 + s*v*x, y = w + x; a = 1/2, s = 1; inputs t (3 values))
+    Model(dx/dt = -a*x + s**2*x/2 + s*v*x, y = w + x; a = 1/2, s = 1)
     >>> model.between.correction[0]
     s**2*x/2
     """

@@ -74,7 +74,7 @@ def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
     for value, (function, mean, cov) in _VALUES.items():
         if function not in formulas.functions:
             continue  # tau and Theta of what moves in continuous time are integrated
-        arguments = formulas.meter_arguments if function in "hGF" else formulas.state_arguments
+        arguments = formulas.arguments(function)
         taken = dict(zip(arguments, (scalar(mean), scalar(cov)), strict=True))
         values[scalar(value)] = structure[function].subs(taken, simultaneous=True)
     return values

@@ -18,57 +18,37 @@ class AngleWarning(UserWarning):
     seems to be in degrees."""
 
 
-def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list[str]) -> Angles:
-    """The components named, in a list or under the keys x and y."""
-    components, places = {"x": x, "y": y}, dict[str, set[int]](x=set(), y=set())
-    for key, names in (given if isinstance(given, Mapping) else {"": given or []}).items():
-        for name in [names] if isinstance(names, str) or not isinstance(names, Sequence) else names:
-            kinds = [kind for kind in components if name in components[kind] and key in ("", kind)]
-            if len(kinds) != 1:
-                raise ModelError(
-                    f"`angles`: {shown(name)} is not the name of one component; name some of "
-                    f"{', '.join(x)} and {', '.join(y)} in a list, or in lists under the keys x "
-                    "and y where a state and a measurement have one name"
-                )
-            places[kinds[0]].add(components[kinds[0]].index(name))
-    return Angles(*(tuple(sorted(places[kind])) for kind in components))
+def read_angles(given: Names | None, x: list[str], y: list[str]) -> Angles:
+    """The components named."""
+    names = () if given is None else given
+    if not isinstance(names, Sequence) or any([*x, *y].count(name) != 1 for name in names):
+        raise ModelError(
+            f"`angles` is a list of names of components, each of one only, such as those of "
+            f"{', '.join([*x, *y])}; got {shown(given)}"
+        )
+    return Angles(*(tuple(i for i, name in enumerate(kind) if name in names) for kind in (x, y)))
 
 
 def warn_of_angles(
-    given: Names | Mapping[str, Names] | None,
-    angles: Angles,
-    state: Mapping[str, sp.Expr],
-    meter: Mapping[str, sp.Expr],
+    given: Names | None, turning: Sequence[sp.Symbol], equations: Mapping[str, sp.Expr]
 ) -> None:
-    """AngleWarning for components that are circular by atan2 and may pass from pi to -pi, where
-    nothing is said of angles, and for measurements that contain an angle as it is, where nothing is
-    said of them."""
-    if given is None:
-        for equations in (state, meter):
+    """AngleWarning for components that may pass from pi to -pi and of which nothing is said: those
+    with an atan2, where nothing is said at all, and those that contain an angle as it is."""
+    for name, equation in equations.items():
+        jumping = [
+            part
+            for part in _outside_sines(equation)
+            if part in turning
             # an atan2 of a point to the right jumps nowhere
-            if circular := [
-                name
-                for name, equation in equations.items()
-                if any(
-                    isinstance(part, sp.atan2) and not part.args[1].is_nonnegative
-                    for part in _outside_sines(equation)
-                )
-            ]:
-                _warn(
-                    f"{' and '.join(circular)}: atan2 jumps from pi to -pi, and a filter takes the "
-                    f"jump for an innovation of a turn; say angles=[{_quoted(circular)}], or "
-                    f"angles=[] if it is no angle or never comes near pi"
-                )
-    elif not (isinstance(given, Mapping) and "y" in given):
-        turning = [[*state][i] for i in angles.x]
-        for i, (name, equation) in enumerate(meter.items()):
-            plain = [str(part) for part in _outside_sines(equation) if str(part) in turning]
-            if plain and i not in angles.y:
-                _warn(
-                    f"{name} contains the angle {plain[0]}, which jumps from pi to -pi, outside "
-                    f'sin and cos: say angles={{"x": [{_quoted(turning)}], "y": ["{name}"]}}, or '
-                    f'"y": [] if it is no angle'
-                )
+            or (given is None and isinstance(part, sp.atan2) and not part.args[1].is_nonnegative)
+        ]
+        if jumping and name not in (given or ()):
+            quoted = ", ".join(f'"{angle}"' for angle in [*(given or ()), name])
+            _warn(
+                f"{name} contains the angle {jumping[0]}, which jumps from pi to -pi, outside sin "
+                "and cos, and a filter takes the jump for an innovation of a turn: say "
+                f"angles=[{quoted}], or angles=[] if nothing comes near pi"
+            )
 
 
 def warn_of_degrees(what: str, values: Any, names: Sequence[str], angles: Components) -> None:
@@ -85,10 +65,6 @@ def warn_of_degrees(what: str, values: Any, names: Sequence[str], angles: Compon
 
 def _warn(text: str) -> None:
     warnings.warn(text, AngleWarning, stacklevel=4)  # where Model.define was called
-
-
-def _quoted(names: Sequence[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names)
 
 
 def _outside_sines(formula: sp.Basic) -> Iterator[sp.Basic]:

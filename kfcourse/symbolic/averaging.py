@@ -79,16 +79,14 @@ def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
     check_averaged(model)
     states, meters = zip(*map(compile_noiseless, model.modes), strict=True)
 
-    def state(x: Array, k: int | None = None) -> Array:
-        k = k or 0
-        values = [np.broadcast_to(equation(x, k), x.shape) for equation in states]
-        return _mean(model.law_at(k + 1), values)
+    def mean_of(equations: Sequence[Noiseless], later: int) -> Noiseless:
+        def mean(x: Array, k: int | None = None) -> Array:
+            now = k or 0
+            return _mean(model.law_at(now + later), [equation(x, now) for equation in equations])
 
-    def meter(x: Array, k: int | None = None) -> Array:
-        k = k or 0
-        return _mean(model.law_at(k), [equation(x, k) for equation in meters])
+        return mean
 
-    return state, meter
+    return mean_of(states, 1), mean_of(meters, 0)
 
 
 def check_averaged(model: JumpModel, what: str = "the average over the modes") -> None:

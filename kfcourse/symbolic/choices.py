@@ -1,5 +1,4 @@
-"""Choices between formulas, Piecewise: indicators where the step decides, jumps where the state
-does."""
+"""Choices between formulas, Piecewise, by the state: have they slopes, do they jump?"""
 
 from __future__ import annotations
 
@@ -8,23 +7,6 @@ from itertools import pairwise
 
 import sympy as sp
 from sympy.core.relational import Relational
-
-
-def by_indicators(formula: sp.Expr, variables: Sequence[sp.Symbol]) -> sp.Expr:
-    """The formula with a sum, of branches times what is 1 where they hold, for each choice that the
-    variables do not decide, such as Piecewise((x, t < 45), (0, True)): a polynomial in x."""
-
-    def summed(choice: sp.Piecewise) -> sp.Expr:
-        conditions = [condition for _, condition in choice.args]
-        return sum(
-            branch * sp.Piecewise(*((int(other is holds), other) for other in conditions))
-            for branch, holds in choice.args
-        )
-
-    return formula.replace(
-        lambda e: isinstance(e, sp.Piecewise) and e.has(*variables) and not decides(e, variables),
-        summed,
-    )
 
 
 def decides(formula: sp.Basic, variables: Sequence[sp.Symbol]) -> bool:

@@ -137,8 +137,8 @@ def check_numbers(name: str, formulas: sp.Basic) -> None:
     """ModelError if expressions hold what is no real number, or a number beyond floats."""
     if formulas.has(*NO_NUMBERS):
         raise ModelError(
-            f"{name}: no finite real value, as something is divided by 0, or the root of a "
-            "negative number taken; change the parameters, or, if so at the mean of a noise, take "
+            f"{name}: no finite real value, as after a division by 0 or a root of a negative "
+            "number; change the parameters, or, if so at the mean of a noise, take "
             "unscented(model) or gauss_hermite(model), or another mean"
         )
     for number in formulas.atoms(sp.Rational, sp.Float):

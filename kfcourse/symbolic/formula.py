@@ -29,10 +29,11 @@ ARGUMENTS = {"atan2": 2}
 CONSTANTS = {"pi": sp.pi}
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.USub: operator.neg, ast.UAdd: operator.pos, ast.And: sp.And, ast.Or: sp.Or,
+    ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos,
+}  # fmt: skip
+COMPARISONS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Lt: sp.Lt, ast.LtE: sp.Le, ast.Gt: sp.Gt, ast.GtE: sp.Ge, ast.Eq: sp.Eq, ast.NotEq: sp.Ne,
 }  # fmt: skip
-ARITHMETIC, COMPARISONS = tuple(OPERATORS)[:4], tuple(OPERATORS)[8:]
 
 NO_NUMBERS = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
 MAX_LENGTH = 2000
@@ -105,10 +106,6 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
     except TypeError:  # SymPy's, where numbers that are not real are compared
         raise FormulaError(formula, "the formula compares what has no real value") from None
-    if degree(expression) > MAX_DEGREE:
-        raise FormulaError(
-            formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it"
-        )
     if expression.has(*NO_NUMBERS):
         raise FormulaError(
             formula,
@@ -195,12 +192,10 @@ class Reader:
                 return self.number(node)
             case ast.Name():
                 return self.name(node)
-            case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
+            case ast.UnaryOp() if type(node.op) in OPERATORS:
                 return OPERATORS[type(node.op)](self.read(node.operand))
-            case ast.BinOp(op=ast.Pow()):
-                return self.power(node)
-            case ast.BinOp() if isinstance(node.op, ARITHMETIC):
-                return OPERATORS[type(node.op)](self.read(node.left), self.read(node.right))
+            case ast.BinOp() if type(node.op) in OPERATORS:
+                return self.operation(node)
             case ast.Call():
                 return self.call(node)
             case ast.IfExp():
@@ -240,8 +235,20 @@ class Reader:
             f"`parameters`",
         )
 
-    def power(self, node: ast.BinOp) -> sp.Expr:
-        base, exponent = self.read(node.left), self.read(node.right)
+    def operation(self, node: ast.BinOp) -> sp.Expr:
+        left, right = self.read(node.left), self.read(node.right)
+        if isinstance(node.op, ast.Pow):
+            self.check_power(node, left, right)
+        result = OPERATORS[type(node.op)](left, right)
+        # now, not at the end: numbers in a power of powers of powers would fill the memory
+        if not isinstance(node.op, ast.Add | ast.Sub) and degree(result) > MAX_DEGREE:
+            raise self.fail(
+                node,
+                f"the formula has products of powers above degree {MAX_DEGREE}; simplify it",
+            )
+        return result
+
+    def check_power(self, node: ast.BinOp, base: sp.Expr, exponent: sp.Expr) -> None:
         if not exponent.is_Rational or abs(exponent) > MAX_EXPONENT:
             raise self.fail(
                 node.right,
@@ -252,30 +259,13 @@ class Reader:
             raise self.fail(node, "a root of a negative number has no real value")
         if base.is_number and base and not 1 / MAX_NUMBER < abs(base) < MAX_NUMBER:
             raise self.fail(node, "the power of this number is too large or too small")
-        result = base**exponent
-        # now, not at the end: numbers in a power of powers of powers would fill the memory
-        if degree(result) > MAX_DEGREE:
-            raise self.fail(
-                node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula"
-            )
-        return result
 
     def condition(self, node: ast.expr) -> Boolean:
-        match node:
-            case ast.Constant(value=bool()):
-                return sp.true if node.value else sp.false
-            case ast.Compare() if all(isinstance(op, COMPARISONS) for op in node.ops):
-                sides = pairwise([self.read(side) for side in (node.left, *node.comparators)])
-                return sp.And(
-                    *(OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, sides, strict=True))
-                )
-            case ast.BoolOp():
-                return OPERATORS[type(node.op)](*map(self.condition, node.values))
-            case ast.UnaryOp(op=ast.Not()):
-                return sp.Not(self.condition(node.operand))
-        raise self.fail(
-            node, "a condition compares: x < 1, 30 <= t < 45, k == 20, joined by `and`, `or`, `not`"
-        )
+        if not isinstance(node, ast.Compare) or any(type(op) not in COMPARISONS for op in node.ops):
+            raise self.fail(node, "a condition compares: x < 1, 30 <= t < 45, k == 20")
+        sides = pairwise([self.read(side) for side in (node.left, *node.comparators)])
+        pairs = zip(node.ops, sides, strict=True)
+        return sp.And(*(COMPARISONS[type(op)](*pair) for op, pair in pairs))
 
     def call(self, node: ast.Call) -> sp.Expr:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:

@@ -110,18 +110,20 @@ class JumpModel:
         built: dict[str, Model] = {}
         for name, change in table("modes", modes).items():
             try:
-                own = table(f"modes.{name}", change)
-                if unknown := sorted(set(own) - set(OF_A_MODE)):
-                    raise ModelError(
-                        f"modes may differ in {', '.join(OF_A_MODE)}, not in {', '.join(unknown)}"
-                    )
+                own = table(f"modes.{name}", change, OF_A_MODE)
                 values = table("parameters", own.get("parameters"))
                 given = shared | own | {"parameters": common | values}
                 built[str(name)] = Model.define(**given)
             except (ModelError, FormulaError) as error:
                 raise ModelError(f"mode {name}: {error}") from None
             changed |= set(values)
-        _check_alike(built)
+        forms = {(mode.x, mode.angles, mode.p, len(mode.v), len(mode.w)) for mode in built.values()}
+        if len(forms) != 1:
+            raise ModelError(
+                "`modes` holds a mode at least, such as {sound = {}, faulty = {...}}, and all have "
+                "the same state, angles, measurement components and noises, named by `symbols` "
+                f'such as v = ["v1", "v2"]; got {shown([*built])}'
+            )
         size, rows = len(built), np.atleast_2d(np.array(transition, dtype=object))
         if rows.shape not in ((1, size), (size, size)) or any(map(np.ndim, rows.flat)):
             raise ModelError(
@@ -218,38 +220,18 @@ class JumpModel:
         return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in pairs)})"
 
 
-def _check_alike(modes: Mapping[str, Model]) -> None:
-    """ModelError unless there are modes, of one state, measurement and noises."""
-    if not modes:
-        raise ModelError("`modes` has no mode; give them by name: {sound = {}, faulty = {...}}")
-    (first, expected), *others = (
-        (name, (mode.x, mode.angles, mode.p, len(mode.v), len(mode.w)))
-        for name, mode in modes.items()
-    )
-    for name, form in others:
-        if form != expected:
-            raise ModelError(
-                f"modes {first} and {name} differ in their state's symbols or angles, or in the "
-                "number of measurement components or noises; name noises by `symbols`, such as "
-                'v = ["v1", "v2"]'
-            )
-
-
 def _chain(rows: Array, model: Model, changed: Collection[str]) -> tuple[sp.ImmutableMatrix, Known]:
     """The chain as formulas, and what it knows of every step."""
     of_step = model.known.names([*model.parameters, *changed, *by_name(model.x, model.v, model.w)])
     # what differs between the modes is not known
     shared = [s for s in model.values if s.name not in changed]
     names = of_step | by_name(model.x, shared)
-    try:
-        entries = [
-            read(p, names, "transition")
-            if isinstance(p, str | sp.Expr)
-            else exact_number("an entry", p)
-            for p in rows.flat
-        ]
-    except (ModelError, FormulaError) as error:
-        raise ModelError(f"`transition`: {error}") from None
+    entries = [
+        read(p, names, "transition")
+        if isinstance(p, str | sp.Expr)
+        else exact_number("an entry of `transition`", p)
+        for p in rows.flat
+    ]
     matrix = sp.ImmutableMatrix(*rows.shape, entries)
     return matrix, model.known.used(matrix, of_step)
 

@@ -105,14 +105,10 @@ class Known:
         return values[k]
 
     def latex(self, time: str = "t") -> list[str]:
-        """Lines of an `aligned` block: the time of a step, and the first values of the inputs."""
+        """The line of an `aligned` block that says which time a step has, if the equations contain
+        it."""
         clock = symbol("t") in self.symbols and "t" not in self.inputs
-        lines = [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"] if clock else []
-        for name, values in self.inputs.items():
-            letter, more = sp.latex(symbol(name)), [r"\ldots"] if len(values) > 6 else []
-            listed = ", ".join([*(f"{value:g}" for value in values[:6]), *more])
-            lines.append(rf"{letter}_0, {letter}_1, \ldots &= {listed}")
-        return lines
+        return [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"] if clock else []
 
 
 def _sequence(name: str, given: Any) -> tuple[float, ...]:
@@ -142,20 +138,15 @@ def varying_law(
         What takes the place of each such noise in the equations, and the law of the noises.
     """
     parts = table(what, given)
-    variance = parts.get("variance")
-    entries = [variance] * len(noises)
-    if isinstance(variance, Sequence) and not isinstance(variance, str):
-        entries = [*variance]
-    formulas = {
-        i: read(entry, symbols, what)
-        for i, entry in enumerate(entries)
-        if isinstance(entry, str) or (isinstance(entry, sp.Expr) and entry.free_symbols)
+    variance = parts.get("variance", 1.0)
+    entries = variance if isinstance(variance, list | tuple) else [variance] * len(noises)
+    deviations = {
+        noise: sp.sqrt(read(entry, symbols, what))
+        for noise, entry in zip(noises, entries, strict=False)
+        if isinstance(entry, str)
     }
-    if formulas:
-        parts["variance"] = [1.0 if i in formulas else each for i, each in enumerate(entries)]
+    if deviations:
+        parts["variance"] = [1.0 if isinstance(entry, str) else entry for entry in entries]
     result = law(what, parts, len(noises))
-    mean = exact_matrix(result.mean)
-    return {
-        noises[i]: mean[i] + sp.sqrt(formula) * (noises[i] - mean[i])
-        for i, formula in formulas.items()
-    }, result
+    means = dict(zip(noises, exact_matrix(result.mean), strict=True))
+    return {v: means[v] + scale * (v - means[v]) for v, scale in deviations.items()}, result

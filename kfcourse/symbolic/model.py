@@ -92,7 +92,7 @@ class Model:
         prior: Mapping[str, Any] | None = None,
         state_noise: Mapping[str, Any] | None = None,
         meter_noise: Mapping[str, Any] | None = None,
-        angles: Names | Mapping[str, Names] | None = None,
+        angles: Names | None = None,
         inputs: Mapping[str, Sequence[float]] | None = None,
         interval: float = 1,
     ) -> Model:
@@ -113,10 +113,10 @@ class Model:
             normal by default.  Variances of noises may be formulas of k, t, the inputs and the
             parameters, such as "0.1 + 0.02*k": the noises are then standard, and the roots of the
             formulas go into the equations.
-        angles : list of names, or dict, optional
-            Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}:
-            they are kept between -pi and pi, and every filter takes their innovations, means and
-            errors the short way round.  [] says that there are none.
+        angles : list of names, optional
+            Components that are angles in radians, such as ["psi", "y2"]: they are kept between -pi
+            and pi, and every filter takes their innovations, means and errors the short way round.
+            [] says that there are none.
         inputs : dict, optional
             Name to a list of values, those at the steps 0, 1, 2...: one sequence for all
             trajectories.
@@ -135,8 +135,8 @@ class Model:
         -----
         AngleWarning
             A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given; a
-            meter contains an angle outside sin and cos, and no key y of `angles` says whether it is
-            one; the prior mean of an angle is beyond 2 pi.
+            meter contains an angle outside sin and cos, and is none; the prior mean of an angle is
+            beyond 2 pi.
 
         Examples
         --------
@@ -181,10 +181,13 @@ class Model:
             read_angles(angles, [s.name for s in x], numbered("y", len(b))),
             known.used(sp.Matrix([*state_equation, *meter_equation]), of_step),
         )
-        state_by_name = dict(zip((s.name for s in x), model.state_equation, strict=True))
-        meter_by_name = dict(zip(model.measured, model.meter_equation, strict=True))
-        warn_of_angles(angles, model.angles, state_by_name, meter_by_name)
-        warn_of_degrees("the prior mean", model.prior.mean, [*state_by_name], model.angles.x)
+        names = [s.name for s in x]
+        if angles is None:
+            warn_of_angles(angles, (), dict(zip(names, model.state_equation, strict=True)))
+        turning = [x[i] for i in model.angles.x]
+        equations = dict(zip(model.measured, model.meter_equation, strict=True))
+        warn_of_angles(angles, turning, equations)
+        warn_of_degrees("the prior mean", model.prior.mean, names, model.angles.x)
         model._check()
         if not model.meter_equation.has(*x):
             raise ModelError(
@@ -197,11 +200,12 @@ class Model:
         """ModelError if an equation cannot be computed with the parameters' values."""
         for what, equation in (("state", self.state_equation), ("meter", self.meter_equation)):
             for formula in equation:
-                place = f"the {what} equation, {formula!s:.100}, with these parameters"
                 try:
-                    check_numbers(place, formula.subs(self.values))
-                except TypeError:  # SymPy's
-                    raise ModelError(f"{place}: it compares what has no real value") from None
+                    number = formula.subs(self.values)
+                except TypeError:  # SymPy's, where a root of a negative number is compared
+                    number = sp.nan
+                place = f"the {what} equation, {formula!s:.100}, with these parameters"
+                check_numbers(place, number)
 
     @property
     def n(self) -> int:
@@ -330,14 +334,7 @@ class Model:
             for name, formula in zip(self.measured, self.meter_equation, strict=True)
         )
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
-        angles = ", ".join(
-            [self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y]
-        )
-        inputs = ", ".join(
-            f"{name} ({len(sequence)} values)" for name, sequence in self.known.inputs.items()
-        )
-        parts = [values, f"angles {angles}" if angles else "", f"inputs {inputs}" if inputs else ""]
-        return f"Model({a}, {b}{''.join(f'; {part}' for part in parts if part)})"
+        return f"Model({a}, {b}{'; ' if values else ''}{values})"
 
 
 def nothing_random(model: Model) -> str:
@@ -372,34 +369,23 @@ def _symbols(
 ) -> dict[str, list[str]]:
     """Names of the state components and noises: given, or x, v, w with numbers as the formulas use
     them."""
-    given = table("symbols", symbols)
-    if set(given) - set("xvw"):
-        raise ModelError(
-            f"`symbols` has the keys x, v, w, not {', '.join(sorted(set(given) - set('xvw')))}"
-        )
+    given = table("symbols", symbols, "xvw")
     result: dict[str, list[str]] = {}
-    names: Sequence[str]
     for key in "xvw":
-        if key in given:
-            names = [given[key]] if isinstance(given[key], str) else given[key]
-            if not isinstance(names, Sequence) or not names:
-                raise ModelError(
-                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", '
-                    f'"{key}2"], got {shown(names)}'
-                )
-        elif key == "x":
-            names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
-        else:
-            numbers = [
-                int(name[1:])
-                for name in used - set(values)
-                if re.fullmatch(key + r"[1-9][0-9]?", name)
-            ]
-            names = [f"{key}{i + 1}" for i in range(max(numbers))] if numbers else [key]
-        result[key] = [check_name(name) for name in names]
+        numbers = (
+            int(name[1:]) for name in used - set(values) if re.fullmatch(key + r"[1-9][0-9]?", name)
+        )
+        count = max(numbers, default=0)
+        if key == "x" and (n > 1 or count):
+            count = n
+        names = given.get(key, [f"{key}{i + 1}" for i in range(count)] or key)
+        if not isinstance(names, Sequence) or not names:
+            raise ModelError(
+                f"`symbols`: {key} must be a name or a list of names, got {shown(names)}"
+            )
+        result[key] = [check_name(name) for name in ([names] if isinstance(names, str) else names)]
     every = [name for names in result.values() for name in names] + [*values]
-    twice = sorted({name for name in every if every.count(name) > 1})
-    if twice:
+    if twice := sorted({name for name in every if every.count(name) > 1}):
         raise ModelError(
             f"{', '.join(twice)} named twice: state, noises, parameters and inputs need different "
             f"names"

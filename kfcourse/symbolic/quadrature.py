@@ -32,7 +32,6 @@ from kfcourse.laws import (
     transpose,
 )
 from kfcourse.symbolic.choices import decides
-from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -44,12 +43,10 @@ MOST_POINTS = 100_000
 # Means may change by this part of a standard deviation when the order is doubled, covariances by
 # this part of themselves.
 CONVERGED = 0.1
-EPS = np.finfo(float).eps
 # Variances are enlarged by this part of themselves (2e-14), so that a root has pivots of 1e-7 at
 # least, and its inverse half of the digits: in directions that a singular covariance knows exactly
 # there would be no points, and no slope.
-UNSEEN = 2 * SINGULAR**2 * EPS
-LOST = 4 * EPS  # what is not above this part of the numbers that it is a difference of is rounding
+UNSEEN = 2 * SINGULAR**2 * np.finfo(float).eps
 
 
 class QuadratureWarning(UserWarning):
@@ -122,7 +119,7 @@ def gauss_hermite(model: Model, order: int = 5) -> Structure:
 def axes(model: Model) -> int:
     """Over how many variables the Gauss-Hermite rule spreads: the state, and the noises of an
     equation that need points."""
-    return max(side.points.shape[1] for side in _sides(model, partial(product_rule, 1)))
+    return max(side.axes for side in _sides(model, partial(product_rule, 1)))
 
 
 def product_rule(order: int, size: int) -> tuple[Array, Array]:
@@ -137,74 +134,24 @@ def product_rule(order: int, size: int) -> tuple[Array, Array]:
     return points, np.prod(list(cartesian(weights / weights.sum(), repeat=size)), axis=1)
 
 
-class _Side(NamedTuple):
-    """An equation of the model as f(x, noises, k), what noises without points add to the
-    covariance, and the points (q, s), standard normal, with their weights (q,)."""
-
-    model: Model
-    function: Callable[..., Array]
-    mean: Array  # of all noises
-    root: Array  # of the covariance of the noises with points, columns for them only
-    factors: Compiled  # B D B^T of those without points
-    angles: Components  # components of the function's value
-    points: Array
-    weights: Array
-
-    def added(self, x: Array, k: int | None) -> Array:
-        """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given
-        x."""
-        covs = self.factors(x, k=k)[0]
-        if covs.ndim > 2:
-            covs = np.einsum("q,...qij->...ij", self.weights, covs)
-        return symmetric(covs)
-
-    def propagated(self, mean: Array, cov: Array, k: int | None) -> tuple[Array, ...]:
-        """A law of the state through the function: its mean, its deviations from that at the points
-        (0 exactly for what does not vary), deviations of x, the root of cov with 1 for what is
-        known, and the covariance that noises without points add."""
-        n = self.model.n
-        root, known = _lower_root(cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n)))
-        dx = np.where(known[..., None, :], 0.0, self.points[:, :n]) @ transpose(root)
-        _warn_of_turns(self.model, dx)
-        x = mean[..., None, :] + dx
-        values = self.function(x, self.mean + self.points[:, n:] @ self.root.T, k)
-        middle = values[..., np.argmin((self.points**2).sum(axis=1)), :]
-        off = difference(values, middle[..., None, :], self.angles)
-        shift = self.weights @ off
-        value, deviation = on_circle(middle + shift, self.angles), off - shift[..., None, :]
-        return value, deviation, dx, root, self.added(x, k)
-
-    def spread(self, deviation: Array) -> Array:
-        return symmetric(transpose(deviation * self.weights[:, None]) @ deviation)
-
-    def regressed(self, mean: Array, cov: Array, k: int | None) -> tuple[Array, Array, Array]:
-        """Mean of the function, its slopes by x, and the covariance of what is not linear in x:
-        regressions on the points."""
-        value, deviation, dx, root, added = self.propagated(mean, cov, k)
-        weighed = deviation * self.weights[:, None]
-        cross = transpose(weighed) @ self.points[:, : self.model.n]
-        # A sum over points that ought to cancel leaves some units of precision: as a gain a
-        # measurement in disguise.
-        variance = np.maximum((weighed * deviation).sum(axis=-2), 0.0)
-        cross = np.where(np.abs(cross) <= LOST * np.sqrt(variance)[..., None], 0.0, cross)
-        slopes = transpose(np.linalg.solve(transpose(root), transpose(cross)))
-        explained = dx @ transpose(slopes)
-        rest = deviation - explained  # no difference of nearly equal matrices
-        size = (np.abs(deviation) + np.abs(explained)).max(axis=-2, keepdims=True)
-        size = size + np.abs(value)[..., None, :]
-        rest = np.where(np.abs(rest) <= LOST * size, 0.0, rest)  # rounding is no noise of the meter
-        return value, slopes, self.spread(rest) + added
-
-
-def _sides(model: Model, rule: Rule, with_factors: bool = False) -> tuple[_Side, _Side]:
+def _sides(model: Model, rule: Rule, with_factors: bool = False) -> list[_Side]:
     """Object and meter, with points for the noises that do not enter linearly, or for those
     `with_factors` of the state, too: `rule` makes them."""
     state, meter = compile_model(model)
-    of_rule = partial(_side, model, rule, with_factors)
-    return (
-        of_rule(state, model.state_equation, model.v, model.state_noise, model.angles.x),
-        of_rule(meter, model.meter_equation, model.w, model.meter_noise, model.angles.y),
+    parts = (
+        (state, model.state_equation, model.v, model.state_noise, model.angles.x),
+        (meter, model.meter_equation, model.w, model.meter_noise, model.angles.y),
     )
+    return [_side(model, rule, with_factors, *part) for part in parts]
+
+
+class _Side(NamedTuple):
+    """An equation of the model: over how many variables its points spread, and a law of the state
+    through it, (mean, cov, k) -> mean of the equation, its slopes by x, and the covariance of what
+    is not linear in x: regressions on the points."""
+
+    axes: int
+    regressed: Callable[[Array, Array, int | None], tuple[Array, Array, Array]]
 
 
 def _side(
@@ -219,18 +166,49 @@ def _side(
 ) -> _Side:
     factors = equation.subs(model.values).jacobian(list(noises))
     varying = (*model.x, *noises) if with_factors else noises
-    columns = zip(noises, factors.T.tolist(), strict=True)
     pointed = np.array(
-        [sp.Matrix(column).has(*varying) or decides(equation, [v]) for v, column in columns]
+        [factors[:, i].has(*varying) or decides(equation, [v]) for i, v in enumerate(noises)]
     )
     for _ in noises:  # and what is correlated with one of them
         pointed |= (law.cov[:, pointed] != 0).any(axis=1)
-    cov = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
-    covariance = model.compiled([model.x], [factors * cov * factors.T])
-    root = np.eye(len(noises))[:, pointed] @ square_root(law.cov[np.ix_(pointed, pointed)])
-    return _Side(
-        model, function, law.mean, root, covariance, angles, *rule(model.n + root.shape[1])
-    )
+    # B D B^T of the noises without points; the mean over points of the covariance given x
+    cov_without = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
+    added = model.compiled([model.x], [factors * cov_without * factors.T])
+    root_of_noise = np.eye(len(noises))[:, pointed] @ square_root(law.cov[pointed][:, pointed])
+    points, weights = rule(model.n + root_of_noise.shape[1])
+    noise = law.mean + points[:, model.n :] @ root_of_noise.T
+    central = np.argmin((points**2).sum(axis=1))
+
+    def regressed(mean: Array, cov: Array, k: int | None) -> tuple[Array, Array, Array]:
+        root, known = _lower_root(cov)
+        standard = np.where(known[..., None, :], 0.0, points[:, : model.n])
+        dx = standard @ transpose(root)
+        x = mean[..., None, :] + dx
+        values = function(x, noise, k)
+        middle = values[..., central, :]
+        off = difference(values, middle[..., None, :], angles)
+        shift = weights @ off
+        deviation = off - shift[..., None, :]
+        cross = transpose(deviation * weights[:, None]) @ standard
+        slopes = transpose(np.linalg.solve(transpose(root), transpose(cross)))
+        rest = deviation - dx @ transpose(slopes)  # no difference of nearly equal matrices
+        covs = added(x, k=k)[0]
+        if covs.ndim > 2:
+            covs = np.einsum("q,...qij->...ij", weights, covs)
+        unexplained = transpose(rest * weights[:, None]) @ rest + covs
+        return on_circle(middle + shift, angles), slopes, symmetric(unexplained)
+
+    return _Side(points.shape[1], regressed)
+
+
+def _lower_root(cov: Array) -> tuple[Array, Array]:
+    """The Cholesky factor, and which components (..., n) are known: their columns are those of
+    I."""
+    n = cov.shape[-1]
+    known = ~(np.diagonal(cov, axis1=-2, axis2=-1) > 0)
+    enlarged = cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n))
+    either = known[..., :, None] | known[..., None, :]
+    return np.linalg.cholesky(np.where(either, np.eye(n), enlarged)), known
 
 
 def _checked(
@@ -241,7 +219,7 @@ def _checked(
     with_factors: bool = False,
 ) -> Structure:
     """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and
-    of twice the order."""
+    of twice the order, if these do not take too many points."""
     name = build.func.__name__.replace("_", "-")
     expect(model, Model, name)
     if model.between is not None:
@@ -249,35 +227,30 @@ def _checked(
     by_rule = partial(_by_points, name, model, with_factors)
     structure = by_rule(rule)
     with np.errstate(all="ignore"):
-        if not all(np.isfinite(part).all() for law in _at_prior(structure) for part in law):
-            _warn(f"{name}: a function of {model} is not finite at the points of the prior law")
-        elif problem := _disagreement(by_rule, order):
-            _warn(f"{name}: {problem}")
-    return structure
-
-
-def _disagreement(by_rule: Callable[[Rule], Structure], order: int) -> str:
-    """What Gauss-Hermite rules of this order and of twice the order say otherwise at the prior law;
-    empty if nothing, or if they take too many points."""
-    rules = (partial(product_rule, points) for points in (order, 2 * order))
-    with warnings.catch_warnings():
-        # these points are not those that the filter uses
-        warnings.simplefilter("ignore", QuadratureWarning)
         try:
-            structure, finer = map(by_rule, rules)
+            coarse, fine = (
+                _at_prior(by_rule(partial(product_rule, points))) for points in (order, 2 * order)
+            )
         except ModelError:
-            return ""
-        model, coarse, fine = structure.model, _at_prior(structure), _at_prior(finer)
-    parts = zip(("next state", "measurement"), coarse, fine, model.angles, strict=True)
-    for what, less, more, angles in parts:
-        for moment, error in zip(("mean", "covariance"), apart(less, more, angles), strict=True):
-            if not (largest := np.abs(error).max()) <= CONVERGED:
-                return (
-                    f"with {2 * order} points an axis in place of {order} the {moment} of "
-                    f"the {what} of {model} at the prior law changes by {100 * largest:.2g} %: it "
-                    "may be infinite, or the function too rough for these points"
-                )
-    return ""
+            return structure
+        parts = zip(("next state", "measurement"), coarse, fine, model.angles, strict=True)
+        errors = {
+            f"{moment} of the {what}": np.abs(error).max()
+            for what, less, more, angles in parts
+            for moment, error in zip(("mean", "covariance"), apart(less, more, angles), strict=True)
+        }
+    for moment, error in errors.items():
+        if not error <= CONVERGED:
+            change = f"changes by {100 * error:.2g} %" if np.isfinite(error) else "is not finite"
+            warnings.warn(
+                f"{name}: with {2 * order} points an axis in place of {order} the {moment} of "
+                f"{model} at the prior law {change}: it may be infinite, or the function too rough "
+                "for these points",
+                QuadratureWarning,
+                stacklevel=3,
+            )
+            break
+    return structure
 
 
 def apart(less: Gaussian, more: Gaussian, angles: Components) -> tuple[Array, Array]:
@@ -297,41 +270,6 @@ def _at_prior(structure: Structure) -> tuple[Gaussian, Gaussian]:
     return now.predict(*prior), Gaussian(h, F)
 
 
-def _warn(text: str) -> None:
-    warnings.warn(text, QuadratureWarning, stacklevel=4)
-
-
-def _warn_of_turns(model: Model, deviation: Array) -> None:
-    """QuadratureWarning if points of an angle go round the circle: their mean is then that of other
-    angles."""
-    for i in model.angles.x:
-        if (widest := np.nanmax(np.abs(deviation[..., i]), initial=0.0)) > np.pi:
-            _warn(
-                f"points of the angle {model.x[i]} lie {widest:.3g} to either side of its "
-                f"mean, more than half a turn: "
-                "its variance is too large for these points; take linearised(model), or a smaller "
-                "prior variance"
-            )
-
-
-def _lower_root(cov: Array) -> tuple[Array, Array]:
-    """The Cholesky factor, and which components (..., n) the earlier ones determine: their columns
-    are those of I."""
-    n, known = cov.shape[-1], np.zeros(cov.shape[:-1], dtype=bool)
-    try:
-        return np.linalg.cholesky(cov), known
-    except np.linalg.LinAlgError:
-        root, rest = np.zeros_like(cov), cov
-    for j in range(n):
-        pivot = rest[..., j, j, None]
-        skipped = ~(pivot > n * EPS * cov[..., j, j, None])
-        column = rest[..., j] / np.sqrt(np.where(skipped, 1.0, pivot))
-        column = np.where(skipped | (np.arange(n) < j), 0.0, column)
-        root[..., j], known[..., j] = np.where(skipped, np.eye(n)[j], column), skipped[..., 0]
-        rest = rest - column[..., :, None] * column[..., None, :]
-    return root, known
-
-
 def _by_points(name: str, model: Model, with_factors: bool, rule: Rule) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights
     (q,))."""
@@ -340,8 +278,8 @@ def _by_points(name: str, model: Model, with_factors: bool, rule: Rule) -> Struc
 
     def at(k: int | None) -> Structure:
         def predict(z: Array, p: Array) -> Gaussian:
-            tau, deviation, *_, added = state.propagated(z, p, k)
-            return Gaussian(tau, state.spread(deviation) + added)
+            tau, A, Q = state.regressed(z, p, k)
+            return Gaussian(tau, symmetric(A @ p @ transpose(A)) + Q)
 
         def measure(m: Array, d: Array) -> Measurement:
             h, G, R = meter.regressed(m, d, k)

@@ -70,25 +70,27 @@ def shown(value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
-def table(what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A table that may have been left out."""
+def table(
+    what: str, given: Mapping[str, Any] | None, keys: Collection[str] | None = None
+) -> dict[str, Any]:
+    """A table that may have been left out, with no other keys than these."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
         raise ModelError(f"`{what}` must be a table such as {{'name': value}}, got {shown(given)}")
+    if keys is not None and (unknown := sorted(set(given) - {*keys})):
+        raise ModelError(f"`{what}` has the keys {', '.join(keys)}, not {', '.join(unknown)}")
     return dict(given)
 
 
 def exact_number(what: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
-    try:
-        number = float(value) if isinstance(value, Real) else float("nan")
-    except OverflowError:
-        number = float("inf")
-    if isinstance(value, bool) or not np.isfinite(number):
-        raise ModelError(f"{what} = {shown(value)}: expected a finite number")
-    if number and not 1e-100 < abs(number) < 1e100:
-        raise ModelError(f"{what} = {shown(value)} is too large or too small; change the units")
+    number = numbers(value)
+    if not isinstance(value, Real) or not (number == 0 or 1e-100 < abs(number) < 1e100):
+        raise ModelError(
+            f"{what} = {shown(value)}: expected a finite number, of a size from 1e-100 to 1e100; "
+            "change the units where it is another"
+        )
     return sp.Rational(str(value))
 
 
@@ -127,47 +129,28 @@ def read(formula: Formula, known: dict[str, sp.Symbol], what: str) -> sp.Expr:
 
 def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
     """A Gaussian from {"mean": ..., "variance": ...}; standard normal for what is left out."""
-    parts = table(what, given)
-    if set(parts) - {"mean", "variance"}:
-        raise ModelError(
-            f"`{what}` has the keys mean and variance, not "
-            f"{', '.join(sorted(set(parts) - {'mean', 'variance'}))}"
-        )
+    parts = table(what, given, ("mean", "variance"))
     mean, cov = numbers(parts.get("mean", 0.0)), numbers(parts.get("variance", 1.0))
     try:
         mean = np.broadcast_to(mean, (size,)).copy()
         cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
-        fits = bool(np.isfinite(mean).all() and np.isfinite(cov).all())
+        fits = cov.shape == (size, size) and bool(np.isfinite([mean, *cov]).all())
     except ValueError:
         fits = False
-    if not fits:
+    if not (fits and np.array_equal(cov, cov.T) and is_covariance(cov)):
         raise ModelError(
-            f"`{what}`: mean and variance must be finite numbers, or lists of {size} numbers "
-            f"(variance: or a matrix), "
-            f"got {', '.join(f'{key} = {shown(value)}' for key, value in parts.items())}"
+            f"`{what}`: the mean must be {size} finite number(s), the variance a number, {size} "
+            f"numbers or a symmetric {size} x {size} matrix, with no negative variance; got "
+            f"{', '.join(f'{key} = {shown(value)}' for key, value in parts.items())}"
         )
-    problem = ""
-    if cov.shape != (size, size):
-        problem = f"the covariance has shape {cov.shape}, expected ({size}, {size})"
-    elif not np.array_equal(cov, cov.T):
-        problem = "the covariance matrix must be symmetric"
-    elif not is_covariance(cov):
-        problem = "negative variance"
-    if problem:
-        raise ModelError(f"`{what}`: {problem}, got {mean} and {cov.tolist()}")
     return Gaussian(mean, cov)
 
 
 def numbers(given: Any) -> Array:
     """Numbers as an array; NaN for what is none.  NumPy would take "1e5" for 100000, and true for
     1."""
-
-    def plain(part: Any) -> bool:
-        if isinstance(part, Sequence) and not isinstance(part, str):
-            return all(map(plain, part))
-        return not isinstance(part, str | bool | np.bool_)
-
     try:
-        return np.asarray(given if plain(given) else np.nan, dtype=float)
+        array = np.asarray(given)
+        return array.astype(float) if array.dtype.kind in "iufO" else np.array(np.nan)
     except (TypeError, ValueError, OverflowError):
         return np.array(np.nan)

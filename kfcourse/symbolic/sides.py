@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from kfcourse.laws import Gaussian
-from kfcourse.symbolic.choices import by_indicators, jumps
+from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix, normal_symbols
@@ -92,8 +92,8 @@ def moments(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
     law = GaussianMoments(
         [*side.x, *side.noise], [*side.mean, *side.law.mean], sp.diag(side.cov, side.D)
     )
-    parts = [by_indicators(formula, law.variables) for formula in side.equation]
-    mean, size = sp.ImmutableMatrix([law.mean_of(part) for part in parts]), len(parts)
+    parts = side.equation
+    mean, size = parts.applyfunc(law.mean_of), len(parts)
     upper = {
         (i, j): law.covariance(parts[i], parts[j]) for i in range(size) for j in range(i, size)
     }

@@ -108,13 +108,10 @@ class Structure:
         formulas = self._derived()
         lines = []
         for name, matrix in formulas.functions.items():
-            before_state = name not in ("h", "G", "F")
-            arguments = formulas.state_arguments if before_state else formulas.meter_arguments
-            names = (
-                ", ".join(sp.latex(a) for a in arguments)
-                if self.model.n == 1
-                else ("z, p" if before_state else "m, d")
-            )
+            arguments = formulas.arguments(name)
+            names = "m, d" if name in "hGF" else "z, p"
+            if self.model.n == 1:
+                names = ", ".join(map(sp.latex, arguments))
             if self.model.between is None:
                 names += ", k" if self.model.timed else ""
             elif matrix.has(*self.model.known.symbols):
@@ -160,13 +157,10 @@ class StructuralFormulas:
     functions: dict[str, sp.ImmutableMatrix]
     unexplained: tuple[sp.ImmutableMatrix, ...]  # Q and R, not multiplied out
 
-    @property
-    def state_arguments(self) -> list[sp.Symbol]:
-        return _distinct(self.z, self.p)
-
-    @property
-    def meter_arguments(self) -> list[sp.Symbol]:
-        return _distinct(self.m, self.d)
+    def arguments(self, function: str) -> list[sp.Symbol]:
+        """z and p, or m and d, of a function."""
+        mean, cov = (self.m, self.d) if function in "hGF" else (self.z, self.p)
+        return list(dict.fromkeys([*mean, *cov]))
 
     @cached_property
     def R(self) -> sp.ImmutableMatrix:
@@ -184,47 +178,34 @@ class StructuralFormulas:
         explain."""
         return _expanded(self.unexplained[0])
 
-    @cached_property
-    def compiled_predict(self) -> Compiled:
-        tau, Theta = self.functions["tau"], self.functions["Theta"]
-        return self.model.compiled([list(self.z), self.p], [list(tau), Theta])
-
-    @cached_property
-    def compiled_measure(self) -> Compiled:
-        """h, G, R, and G d G^T: F is their sum."""
-        h, G = self.functions["h"], self.functions["G"]
-        outputs = [list(h), G, self.R, G * self.d * G.T]
-        return self.model.compiled([list(self.m), self.d], outputs)
-
-    @cached_property
+    @cached_property  # compiled where it is asked for
     def compiled_transition(self) -> Compiled:
         return self.model.compiled([list(self.z), self.p], [self.A, self.Q])
 
     def structure(self) -> Structure:
         """The structure; of a model that depends on the step, one that must be told which."""
-        return of_steps(self.name, self.model, self._at, self)
-
-    def _at(self, k: int | None) -> Structure:
-        predict, measure = self.compiled_predict, self.compiled_measure
+        tau, Theta, h, G = (self.functions[name] for name in ("tau", "Theta", "h", "G"))
+        predict = self.model.compiled([list(self.z), self.p], [list(tau), Theta])
+        # F is the sum of the last two
+        outputs = [list(h), G, self.R, G * self.d * G.T]
+        measure = self.model.compiled([list(self.m), self.d], outputs)
         angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
 
-        def predicted(z: Vectors, p: Matrices) -> Gaussian:
-            tau, Theta = predict(z, p, k=k)
-            return Gaussian(on_circle(tau, angles.x), Theta)
+        def at(k: int | None) -> Structure:
+            def predicted(z: Vectors, p: Matrices) -> Gaussian:
+                tau, Theta = predict(z, p, k=k)
+                return Gaussian(on_circle(tau, angles.x), Theta)
 
-        def measured(m: Vectors, d: Matrices) -> Measurement:
-            h, G, R, explained = measure(m, d, k=k)
-            return measurement(h, G, explained + R, R)
+            def measured(m: Vectors, d: Matrices) -> Measurement:
+                h, G, R, explained = measure(m, d, k=k)
+                return measurement(h, G, explained + R, R)
 
-        return Structure(
-            self.name,
-            self.model,
-            predicted,
-            measured,
-            # compiled where it is asked for
-            lambda z, p: Transition(*self.compiled_transition(z, p, k=k)),
-            self,
-        )
+            def transition(z: Vectors, p: Matrices) -> Transition:
+                return Transition(*self.compiled_transition(z, p, k=k))
+
+            return Structure(self.name, self.model, predicted, measured, transition, self)
+
+        return of_steps(self.name, self.model, at, self)
 
 
 def of_steps(
@@ -236,10 +217,6 @@ def of_steps(
     """The structure at every step; of a model that depends on the step the structure whose
     `Structure.at` makes those of each step."""
     return Structure(name, model, formulas=formulas, at_step=at) if model.timed else at(None)
-
-
-def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
-    return list(dict.fromkeys([*mean, *cov]))
 
 
 def linearised(model: Model) -> Structure:

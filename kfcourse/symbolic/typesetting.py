@@ -30,38 +30,33 @@ def equation_latex(equation: Equation, names: Mapping[Any, str] | None = None) -
     """LaTeX of side = side = ..., with `&` for an aligned environment, in several lines where it is
     long.
 
-    Sides that print alike are printed once.
+    Sides that print alike are printed once.  Transposes are T, derivatives have no brackets, and
+    the terms and factors of an `UnevaluatedExpr` stand as they are.
     """
 
     def side_lines(side: Side) -> list[str]:
         if isinstance(side, str):
             return [side]
-        return printed_lines(_printer(side, names), side, WIDTH - 6)
+        settings = {
+            "symbol_names": dict(names or {}),
+            "diff_operator": "d",
+            "mat_delim": "(",
+            "order": "none" if isinstance(side, sp.UnevaluatedExpr) else None,
+        }
+        return Printer(settings).lines(side, WIDTH - 6)
 
     first, *others = (side for side, _ in groupby(map(side_lines, equation)))
-    if len(first) > 1:
-        raise ValueError(
-            "the left side of an equation is too long for one line: give it a name, and the "
-            "formula as the right side"
-        )
+    left = " ".join(first)
     lines: list[str] = []
-    line, room = first[0] + " ", WIDTH - symbols(first[0])
+    line, room = left + " ", WIDTH - symbols(left)
     for number, side in enumerate(others):
         if number and (len(side) > 1 or symbols(side[0]) + 3 > room):
-            lines, line, room = [*lines, line], "", WIDTH - symbols(first[0])
+            lines, line, room = [*lines, line], "", WIDTH - symbols(left)
         line += ("&= " if not number or not line else " = ") + side[0]
         room -= symbols(side[0]) + 3
         for continued in side[1:]:
             lines, line, room = [*lines, line], rf"&\quad {continued}", 0
     return "\\\\\n".join([*lines, line])
-
-
-def printed_lines(printer: Printer, expression: Any, width: float) -> list[str]:
-    """An expression as it is printed, in as many lines as it takes; only sums are broken."""
-    whole = printer.doprint(expression)
-    if symbols(whole) <= width or not isinstance(expression, sp.Add):
-        return [whole]
-    return joined([printer.doprint(term) for term in printer.terms(expression)], width)
 
 
 def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
@@ -73,24 +68,6 @@ def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
             lines.append("")
         lines[-1] += (" " if lines[-1] else "") + signed
     return lines
-
-
-def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
-    """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around
-    derivatives; of an `UnevaluatedExpr` with its terms and factors in the order in which they
-    stand."""
-    return _printer(expression, names).doprint(expression)
-
-
-def _printer(expression: Any, names: Mapping[Any, str] | None) -> Printer:
-    settings = {
-        "symbol_names": dict(names or {}),
-        "diff_operator": "d",
-        "mat_delim": "(",
-        "fold_short_frac": False,
-        "order": "none" if isinstance(expression, sp.UnevaluatedExpr) else None,
-    }
-    return Printer(settings)
 
 
 def aligned(lines: Sequence[str]) -> str:
@@ -114,9 +91,16 @@ class Printer(LatexPrinter):
     def doprint(self, expr: Any) -> str:
         return _NAME_BEFORE_A_FACTOR.sub(r"\1\, ", super().doprint(expr))
 
-    def terms(self, total: sp.Add) -> list[sp.Expr]:
+    def lines(self, expression: Any, width: float) -> list[str]:
+        """An expression as it is printed, in as many lines as it takes; only sums are broken."""
+        whole = self.doprint(expression)
+        if symbols(whole) <= width or not isinstance(expression, sp.Add):
+            return [whole]
+        return joined([self.doprint(term) for term in self._as_ordered_terms(expression)], width)
+
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
         """The terms of a sum in the order in which they are printed."""
-        terms = super()._as_ordered_terms(total)
+        terms = super()._as_ordered_terms(expr)
         return terms if self.order == "none" else _ordered(terms)
 
     def _print_Symbol(self, expr: sp.Symbol, style: str = "plain") -> str:
@@ -127,9 +111,6 @@ class Printer(LatexPrinter):
             if several and expr not in self._settings["symbol_names"]
             else printed
         )
-
-    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
-        return self.terms(expr)
 
     def _print_Identity(self, expr: sp.Identity) -> str:
         return "I"

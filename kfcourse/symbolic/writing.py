@@ -13,7 +13,7 @@ from itertools import groupby
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
-from kfcourse.symbolic.typesetting import WIDTH, Printer, printed_lines, symbols
+from kfcourse.symbolic.typesetting import WIDTH, Printer, symbols
 
 
 def formula_latex(
@@ -38,7 +38,7 @@ def formula_lines(
 ) -> list[str]:
     """The same in as many lines as a page is wide beside what stands before them; only sums are
     broken."""
-    return printed_lines(_Writer(variables), _readable(expression), WIDTH - symbols(before))
+    return _Writer(variables).lines(_readable(expression), WIDTH - symbols(before))
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:
@@ -46,24 +46,12 @@ def _readable(expression: sp.Expr) -> sp.Expr:
     sin^2 u + cos^2 u is 1."""
     if expression.has(expm1):
         expression = sp.expand(expression.replace(expm1, lambda u: sp.exp(u) - 1))
-    if not (expression.has(sp.sin) and expression.has(sp.cos)):
-        return expression
-    ways = (
-        expression,
-        _by_other(expression, sp.sin, sp.cos),
-        _by_other(expression, sp.cos, sp.sin),
-    )
+    ways = [expression]
+    for squared, other in ((sp.sin, sp.cos), (sp.cos, sp.sin)):
+        if functions := expression.atoms(squared):
+            squares = {function**2: 1 - other(*function.args) ** 2 for function in functions}
+            ways.append(sp.expand(expression.xreplace(squares)))
     return min(ways, key=lambda way: len(sp.Add.make_args(way)))
-
-
-def _by_other(expression: sp.Expr, squared: type[sp.Function], other: type[sp.Function]) -> sp.Expr:
-    """With 1 - other^2 for the square of one of both functions."""
-    return sp.expand(
-        expression.replace(
-            lambda e: e.is_Pow and e.exp == 2 and e.base.func is squared,
-            lambda e: 1 - other(*e.base.args) ** 2,
-        )
-    )
 
 
 _LONG = re.compile(r"(?<![\w.,])\d{5,}(?!\w)")
@@ -97,21 +85,27 @@ class _Writer(Printer):
         return super()._print_Mul(sp.Mul(*factors, evaluate=False))
 
     def factor_key(self, factor: sp.Expr) -> tuple[bool, bool, int, str]:
-        ranks = [self.rank[symbol] for symbol in factor.free_symbols if symbol in self.rank]
         # functions last, or what follows would seem to be in the argument: g cos m d
         last = isinstance(factor.as_base_exp()[0], sp.Function)
-        return last, not factor.is_number, max(ranks, default=-1), str(factor)
+        return last, not factor.is_number, max(self.ranks(factor), default=-1), str(factor)
 
-    def terms(self, total: sp.Add) -> list[sp.Expr]:
+    def ranks(self, formula: sp.Expr) -> list[int]:
+        return [self.rank[symbol] for symbol in formula.free_symbols if symbol in self.rank]
+
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
         """Terms with the same parameters together: first the group with the shortest, earliest
         term; in it powers fall."""
         ordered = []
-        for (noises, parameters), group in groupby(sorted(total.args, key=self.kind), self.kind):
+        for (noises, parameters), group in groupby(sorted(expr.args, key=self.kind), self.kind):
             members = sorted(
                 group, key=lambda term: [-self.degree(term, symbol) for symbol in self.rank]
             )
             first = min(
-                (term.could_extract_minus_sign(), self.degree(term, *self.rank), self.place(term))
+                (
+                    term.could_extract_minus_sign(),
+                    self.degree(term, *self.rank),
+                    min(self.ranks(term), default=len(self.rank)),
+                )
                 for term in members
             )
             ordered.append((noises, first, parameters, members))
@@ -128,21 +122,8 @@ class _Writer(Printer):
         ]
         return len(term.free_symbols & self.noises), str(sp.Mul(*parameters))
 
-    def place(self, term: sp.Expr) -> int:
-        return min(
-            (self.rank[symbol] for symbol in term.free_symbols if symbol in self.rank),
-            default=len(self.rank),
-        )
-
     def degree(self, term: sp.Expr, *symbols: sp.Symbol) -> float:
         """Degree of the term in these variables; a function of them counts as one."""
-        factors = sp.Mul.make_args(term)
-        return sum(self.power(factor) for factor in factors if factor.has(*symbols))
-
-    def power(self, factor: sp.Expr) -> float:
-        exponent = factor.as_base_exp()[1]
-        return (
-            float(exponent)
-            if exponent.is_number and exponent.is_real and not isinstance(factor, sp.exp)
-            else 1.0
-        )
+        factors = (factor for factor in sp.Mul.make_args(term) if factor.has(*symbols))
+        powers = (factor.as_base_exp()[1] for factor in factors)
+        return sum(float(power) if power.is_Number else 1.0 for power in powers)

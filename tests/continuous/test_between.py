@@ -375,7 +375,7 @@ def test_angles_stay_on_the_circle():
         "0.1",
         "x + w",
         interval=1,
-        angles={"x": ["x"], "y": ["y"]},
+        angles=["x", "y"],
         prior={"mean": 3, "variance": 0.01},
     )
     tau, _ = linearised(model).at(0).predict(np.array([[3.0]]), np.array([[[0.01]]]))

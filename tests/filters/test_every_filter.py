@@ -400,7 +400,7 @@ def test_what_is_of_the_wrong_kind_is_refused(build, wanted):
 
 
 SCALAR = linearised(Model.define("0.9*x + v", "x + w"))
-ANGULAR = linearised(Model.define("x + 0.1*v", "x + 0.1*w", angles={"x": ["x"], "y": []}))
+ANGULAR = linearised(Model.define("x + 0.1*v", "x + 0.1*w", angles=["x", "y"]))
 JUMPING = find_variant("J1").model
 WITHIN_MODES = [gaussian(mode) for mode in JUMPING.modes]
 MEMORY = "memory must be a positive whole number, got "

@@ -272,7 +272,7 @@ def test_a_design_without_a_trajectory_in_a_mode_says_so():
         )
 
 
-TURNING = JumpModel.define("x + v", "x + w", **ONE_MODE, angles={"x": ["x"], "y": []})
+TURNING = JumpModel.define("x + v", "x + w", **ONE_MODE, angles=["x", "y"])
 PLANE = JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", **ONE_MODE)
 
 

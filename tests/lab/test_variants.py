@@ -84,7 +84,7 @@ BAD_VARIANTS = {  # more that a model refuses: test_model, test_formula
         "the input u must be a list",
     ),
     "no inputs": (GOOD.replace("x + w", "x + u + w") + "inputs = 3", "`inputs` must be a table"),
-    "angles 3": (GOOD + "angles = 3", "`angles`: 3 is not the name of one component"),
+    "angles 3": (GOOD + "angles = 3", "`angles` is a list of names of components"),
     "ten thousand hexadecimal digits": (
         GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}",
         "numbers of thousands of digits",

@@ -165,7 +165,7 @@ def test_angles_go_the_short_way_round_in_the_past_too():
         model = Model.define(
             ["x1 + 0.5*x2 + 0.1*v1", "x2 + 0.2*v2"],
             ["x1 + 0.3*w"],
-            angles={"x": ["x1"], "y": ["y"]},
+            angles=["x1", "y"],
             prior={"mean": [3.0 + by, 0.1], "variance": 0.2},
         )
         y = np.pi + by + 0.3 * np.sin(np.arange(40.0) ** 2)

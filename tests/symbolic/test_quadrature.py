@@ -5,14 +5,12 @@ import warnings
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from kfcourse import (
     Model,
     QuadratureWarning,
     gauss_hermite,
-    gaussian,
-    likelihood,
     linearised,
     run,
     simulate,
@@ -108,35 +106,6 @@ def test_where_the_points_do_nothing_is_said(kind, term):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         kind(Model.define(f"{term} + v", "x + w", prior={"variance": 0.5}))
-
-
-@pytest.mark.parametrize("kind", [gauss_hermite, unscented])
-@pytest.mark.parametrize("units", [1.0, 1e-9])
-def test_what_a_meter_does_not_tell_is_exactly_nothing(kind, units):
-    """Points sum odd functions to 1e-17: a gain of that size makes the estimate the measurement, in
-    units of its own."""
-    model = Model.define(
-        "x + v", "u*(x**2/20 + cos(x)) + u*w", {"u": units}, prior={"mean": 0, "variance": 5}
-    )
-    with warnings.catch_warnings(action="ignore", category=QuadratureWarning):
-        measured = kind(model).measure(np.zeros((3, 1)), np.array([[5.0], [0.1], [7.3]])[:, None])
-    assert_array_equal(measured.G, 0.0)
-    assert_array_equal(measured.F, measured.R)
-
-
-@pytest.mark.parametrize("build", [unscented, gauss_hermite])
-def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
-    """The states are then known, as by the closed form; 1e-32 in the place of 0 made a likelihood
-    of -1e29."""
-    model = Model.define("0.9*x + v", "2*x + 1", prior={"mean": 0.3, "variance": 2.0})
-    y = np.array([1.7, 0.2, -3.0])
-    estimates, exact = (run(aof(filter_(model)), y) for filter_ in (build, gaussian))
-    assert_array_equal(estimates.cov, np.zeros((3, 1, 1, 1)))
-    assert_allclose(estimates.mean, exact.mean, rtol=1e-12)
-    still = Model.define("x", "x", prior={"mean": 0, "variance": 2.0})
-    assert_array_equal(run(aof(build(still)), np.ones(3)).cov, np.zeros((3, 1, 1, 1)))
-    with pytest.raises(ValueError, match="no density for the measurement of step 1"):
-        likelihood(aof(build(still)), np.array([1.0, 1.1]))
 
 
 def test_a_covariance_that_rounding_has_broken_is_no_error():

@@ -168,7 +168,7 @@ class Sensor:
             parameters,
             symbols={"x": list(states), "v": ["not_used"]},
             meter_noise={"variance": variance},
-            angles=None if angles is None else {"y": angles},
+            angles=angles,
         )
         return cls(name, model, period, **timing)
 

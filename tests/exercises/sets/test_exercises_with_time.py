@@ -87,7 +87,7 @@ def test_what_cannot_be_asked_is_refused_with_the_reason():
         rendered("a", "growth")
     for letter, table, where in (
         *((letter, ANGLE, "measurement") for letter in "bcdg"),
-        ("e", ANGLE | {"angles": {"x": ["x"], "y": ["y"]}}, "state"),
+        ("e", ANGLE | {"angles": ["x", "y"]}, "state"),
     ):
         words = f"set {letter} asks about a model without angles in the {where}"
         with pytest.raises(ExerciseError, match=words):
