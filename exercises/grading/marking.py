@@ -50,7 +50,6 @@ from kfcourse.exercises.grading.submissions import (
     Returned,
     cells_of,
     claimed,
-    openings,
     read_document,
     syntax,
 )
@@ -103,12 +102,12 @@ def grade(work: Returned, setting: Setting, start: Any = Kernel) -> Grade:
 
 
 def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
-    """Set and variant that a notebook without metadata opens."""
-    for cell in cells:
-        for letter, variant in openings(cell.source):
-            name = variant.get("name") if isinstance(variant, dict) else variant
-            return {"set": str(letter), "variant": str(name or "53")}
-    return None
+    """Set and variant, a name or a table's, that a notebook without metadata opens."""
+    opening = re.search(
+        r"""\bexercise\(\s*["'](\w+)["'](?:,\s*(?:variant=)?(?:{'name':\s*)?["']([^"']+))?""",
+        "\n".join(cell.source for cell in cells),
+    )
+    return opening and {"set": opening[1], "variant": opening[2] or "53"}
 
 
 def _grade(

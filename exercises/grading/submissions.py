@@ -228,30 +228,12 @@ def claimed(claim: Any, variants_file: Path | None, given: str = "") -> tuple[Ex
     try:
         variant = find_variant(given or name, variants_file)
     except VariantError as error:
-        hint = (
-            ""
-            if variants_file
-            else f"if variant {given or name} is of a file of yours, name that with --variants; "
-        )
         # the advice first: the list may be long, and is cut in the table
-        raise Unreadable(f"{hint}{error}") from None
+        raise Unreadable(
+            f"if variant {given or name} is of a file of yours, name that with --variants; {error}"
+        ) from None
     marked = f"for variant {name}, and marked as variant {variant.name}, which was given"
     return Exercise(letter, variant), [clean(marked)] if given and name != given else []
-
-
-def openings(source: str) -> Iterator[tuple[Any, Any]]:
-    """Arguments of the calls exercise("a", ...) in a cell, where they are literals."""
-    for node in ast.walk(syntax(source) or ast.Module([], [])):
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id == "exercise"
-        ):
-            with suppress(ValueError, TypeError):
-                arguments = [ast.literal_eval(argument) for argument in node.args]
-                named = {keyword.arg: ast.literal_eval(keyword.value) for keyword in node.keywords}
-                letter, variant, *_ = [*arguments, *named.values(), None, None]
-                yield letter, variant
 
 
 def syntax(source: str) -> ast.Module | None:

@@ -157,6 +157,20 @@ def test_of_a_first_line_the_definition_is_the_hint_and_nothing_of_the_key_is_sh
 
 
 @pytest.mark.parametrize(
+    ("line", "kind", "term"),
+    [
+        ("u*p + q + u*z^2", "lost-factor", "1 - u"),
+        ("p + (1 - u)*q + u*z^2", "lost-factor", "p"),
+        ("u*p + (1 - u)*q", "lost", "u*p + (1 - u)*q"),
+    ],
+)
+def test_what_a_bracket_is_multiplied_by_is_lost_from_a_term(line, kind, term):
+    """And no other term in it put in question: p1 does not stand above as it is."""
+    verdict = verdict_of(f"W = u*(p + z^2) + (1 - u)*q\n = {line}")
+    assert kind_and_term(verdict) == (kind, term)
+
+
+@pytest.mark.parametrize(
     ("line", "says"),
     [
         ("exp(d/2)*sin(m)", "a sign in `exp(d/2)`"),
