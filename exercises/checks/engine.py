@@ -163,7 +163,7 @@ def check(
 
     `past` is what was handed in before, of the same notebook; the answer is added to it.
     """
-    past = Attempts() if past is None else past
+    past = past or Attempts()
     past.wrong.pop(question.name, None)
     try:
         result = _Check(posed(question, exercise), answer, seconds, past).result()

@@ -167,12 +167,12 @@ class Exercise:
     def hidden_steps(self) -> list[int]:
         """Steps that take the place of 0, 1, 2... in hidden functions: where an input rests, a
         wrong one would pass."""
-        return telling_steps(self.hidden_model)
+        return telling_steps(self.hidden_model) if self.model.timed else []
 
     def hidden_functions(self) -> tuple[Callable, Callable]:
         """Hidden measure and predict of arrays, which take the step where the model depends on
         it."""
-        return array_functions(self.hidden.gaussian, self.hidden_steps if self.model.timed else ())
+        return array_functions(self.hidden.gaussian, self.hidden_steps)
 
     @cached_property
     def places(self) -> list[Mapping[sp.Symbol, sp.Expr]]:
@@ -204,7 +204,7 @@ class Exercise:
     @cached_property
     def hidden_noiseless(self) -> tuple[Callable, Callable]:
         """The same of the hidden model."""
-        return noiseless_functions(self.hidden_model, self.hidden_steps if self.model.timed else ())
+        return noiseless_functions(self.hidden_model, self.hidden_steps)
 
     @property
     def prior_mean(self) -> np.ndarray:

@@ -409,6 +409,28 @@ def limit(case: Case) -> Said | None:
     return "one-part-wrong", f"It is right where {' or '.join(where[:3])} is zero: {part}."
 
 
+def terms(case: Case) -> Said | None:
+    """Some terms of a formula, multiplied out."""
+    if case.numeric or len(case.formulas[0]) != 1:
+        return None
+    mine, theirs = (set(sp.Add.make_args(sp.expand(formula))) for (formula,) in case.formulas)
+    if not mine & theirs or len(mine) > 12:
+        return None
+    if theirs < mine:
+        return (
+            "some-terms-wrong",
+            "All terms that belong there are there, and something else besides.",
+        )
+    right = ", ".join(sorted(map(str, mine & theirs)))
+    # which may be right in another form, in part
+    more = "another is missing" if mine < theirs else "look at the rest"
+    return (
+        "some-terms-wrong",
+        f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} "
+        f"right; {more}.",
+    )
+
+
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
     compared(results),
     rough,
@@ -420,6 +442,7 @@ HINTS: tuple[Callable[[Case], Said | None], ...] = (
     compared(arguments),
     sometimes,
     limit,
+    terms,
     compared(slips),
 )
 

@@ -94,8 +94,6 @@ def grade(work: Returned, setting: Setting, start: Any = Kernel) -> Grade:
         return _grade(work, cells, claim, setting, start)
     except OutOfTime:
         problem = "the notebook of its variant cannot be made in time"
-    except OSError as error:  # a full disk, mostly
-        problem = f"{error.strerror or error}{': ' * bool(error.filename)}{error.filename or ''}"
     except Exception as error:  # also of libraries: one notebook must not stop the others
         problem = str(error) or type(error).__name__
     return Grade(work.name, FAILED, notes=(clean(problem),))

@@ -109,14 +109,16 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
         for name in folders:
             if (path := Path(at, name)).is_symlink():
                 yield path, LINK
-        for path in (Path(at, name) for name in files):
+        for name in files:
+            path = Path(at, name)
             kind = path.suffix.lower()
             notebook = path.with_name(
                 path.name[: len(path.name) - len(kind)].removesuffix(".ipynb") + ".ipynb"
             )
+            if path.parent.name == ".ipynb_checkpoints" or name.startswith("._"):
+                continue  # Jupyter's, or a Mac's
             if kind == ".ipynb":
-                if not _is_copy(path):
-                    yield path, _unread(path, path.relative_to(folder))
+                yield path, _unread(path, path.relative_to(folder))
             elif path.stem.lower().endswith(".ipynb"):
                 if kind not in (".bak", ".swp"):
                     yield path, RENAMED
@@ -124,15 +126,6 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
                 yield path, NOT_READ[kind]
     for error in unread:
         yield Path(error.filename), f"a folder that cannot be read: {error.strerror}"
-
-
-def _is_copy(path: Path) -> bool:
-    """Whether a program has made it beside a notebook that is there: Jupyter its checkpoints, a Mac
-    its `._` files."""
-    if path.parent.name == ".ipynb_checkpoints":
-        return (path.parent.parent / f"{path.stem.removesuffix('-checkpoint')}.ipynb").exists()
-    at = Path(*(part for part in path.parent.parts if part != "__MACOSX"))
-    return path.name.startswith("._") and (at / path.name[2:]).exists()
 
 
 def _unread(path: Path, inside: PurePath) -> str:

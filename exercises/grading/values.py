@@ -94,11 +94,7 @@ def _text(formula: sp.Expr) -> str:
 def _array(value: Any, functions: Functions | None) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "O":
-        return [
-            "objects",
-            list(array.shape),
-            [encode(entry, functions) for entry in array.ravel().tolist()],
-        ]
+        return encode(array.tolist(), functions)
     if array.dtype.kind not in "biufc":
         return ["other", f"array of {array.dtype.name}"]
     kind = "scalar" if isinstance(value, np.generic | complex) else "array"
@@ -138,11 +134,6 @@ def _decoded(data: Any, proxies: Proxies | None) -> Any:
                 raise ProtocolError(f"an array of {array.dtype}")
             array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
             return array[()] if kind == "scalar" else array
-        case ["objects", list(shape), list(parts)]:
-            array = np.empty(len(parts), dtype=object)
-            for place, part in enumerate(parts):
-                array[place] = _decoded(part, proxies)
-            return array.reshape(shape)
         case ["formula", str(text)]:
             return formula(text)
         case ["formulas", int(rows), int(columns), list(texts)]:

@@ -153,9 +153,9 @@ ANSWERING = {
         (1, 0.4),
         [
             (1, "ArrowRight", 0.42),
-            (0, "PageUp", 1.45),
-            (0, "Home", -2),
+            (0, "PageUp", 1.5),
             (1, "Home", 0.02),
+            (0, "End", 3.5),
         ],
         [(0, -150, 40, "mean")],
         lines_by_quadrature,

@@ -178,12 +178,8 @@ def test_sensor_says_what_is_wrong(timing, message):
 
 def test_observe_says_what_is_wrong():
     first, second = two_sensors()
-    for sensors, shape, message in (
-        ([first, replace(second, name="fast")], (1, 2), "a name of its own"),
-        ([first], (2,), "at 21 moments must have the shape (21, runs, 2), got (21, 2)"),
-    ):
-        with pytest.raises(ValueError, match=re.escape(message)):
-            observe(sensors, lambda times, of=shape: np.zeros((len(times), *of)), 1.0, 0)
+    with pytest.raises(ValueError, match="a name of its own"):
+        observe([first, replace(second, name="fast")], lambda times: np.zeros(0), 1.0, 0)
 
 
 # ---------------------------------------------------------------- fusion: the Kalman filter

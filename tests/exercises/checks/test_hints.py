@@ -90,8 +90,6 @@ DIVIDED = pair(Mistake("divided", "It is divided.", lambda a, b: (a + b, a / b))
 WRONG = [
     (NUMBERS, lambda a: -a, "wrong-sign", ""),
     (NUMBERS, lambda a: a / 2, "half-of-it", ""),
-    (NUMBERS, lambda a: 2 * a, "twice-of-it", ""),
-    (NUMBERS, lambda a: 1 / a, "inverse", ""),
     (MATRIX, lambda a: a.T, "transposed", ""),
     (SYMBOLS, lambda a: a.T, "transposed", ""),
     (CARRIED, lambda A, P: A.T @ P @ A, "right-for-scalars-only", ""),
@@ -121,6 +119,12 @@ WRONG = [
     (CEILING, lambda a, n: np.ceil(3 * a), "argument-unused", ""),
     (LAW, lambda *values: np.round(of_law(*values), 2), "low-precision", "rounded"),
     (LAW, lambda a, *rest: of_law(a, *rest) - a[0], "wrong-term", "one number for the whole"),
+    (
+        formulas(lambda z, p: c**2 * p + e**2 * (1 + sp.cos(2 * z)) / 2),
+        lambda z, p: c**2 * p + e**2 * sp.cos(z) ** 2 + sp.exp(c * e * p * z),
+        "some-terms-wrong",
+        "c**2*p is right; look at the rest.",
+    ),
     (TWO, lambda z, p: (3 * e * sp.cos(z), p * z), "wrong-factor", "a factor that is a number"),
     (
         TWO,
