@@ -7,20 +7,15 @@ import numpy as np
 import pytest
 
 from kfcourse import (
-    Ensemble,
     JumpModel,
     Model,
     NoClosedForm,
     NotFinite,
-    compare,
     continuous,
-    design,
     gaussian,
     likelihood,
     linearised,
-    predictions,
     run,
-    smooth,
 )
 from kfcourse.filters import aof, duof
 
@@ -41,28 +36,15 @@ Y = np.zeros(3)
             r"^a run expects a Filter, got Structure linearised: give a filter",
         ),
         (
-            lambda: smooth(MODEL, Y),
-            r"^smooth expects a Filter, got Model: give a filter, such as aof",
-        ),
-        (
             lambda: likelihood(duof(MODEL), Y),
             r"^likelihood expects a Filter, got Design duof: .* design",
         ),
-        (lambda: predictions(aof, Y), r"^a run expects a Filter, got function aof: give a filter"),
         (
             lambda: gaussian(FILTER),
             r"^gaussian expects a Model, got Filter aof-lin.*: give a model, .* filter",
         ),
         (lambda: linearised(JUMPS), "got JumpModel"),  # as one without modes
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
-        (
-            lambda: design([MODEL], Ensemble(MODEL, 10, 2, 1)),
-            r"^design expects a Design, got Model",
-        ),
-        (
-            lambda: compare([FILTER, MODEL], MODEL, 10, 2, 1),
-            r"^compare expects a Filter, got Model: give a filter",
-        ),
     ],
 )
 def test_another_kind_of_value_is_refused_in_words(call, message):

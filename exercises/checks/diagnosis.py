@@ -17,7 +17,6 @@ from kfcourse.exercises.checks.hints import general
 from kfcourse.exercises.checks.question import Answer, Mistake
 from kfcourse.exercises.checks.reference import Posed
 
-MANY = 3  # numbers that are no coincidence
 GENERAL = (
     "It does not look like one of the usual mistakes. Check each step of the derivation, "
     "and try a case whose answer you know."
@@ -97,14 +96,7 @@ class Wrong:
     def _mistakes(self, case: Case) -> list[Mistake]:
         """Known mistakes that one result looks like: of all, those that spoil the fewest results
         that are right; of these, those that explain the most of the wrong ones."""
-        agree, known = self.posed.agree, self.posed.known
-        seen = [(mistake, would) for mistake, would in known if case.given(would)]
-        good = [agree([a], [b]) for a, b in case.pairs]
-        first = good.index(False)
-        if not seen and case.numeric and case.expected[first].size >= MANY:
-            # as in the first call that is wrong: more may be, later
-            calls = [i for i, right in enumerate(good) if right or i == first]
-            seen = [(mistake, would) for mistake, would in known if case.given(would, calls)]
+        seen = [(mistake, would) for mistake, would in self.posed.known if case.given(would)]
         ranks = [self._rank(would) for _, would in seen]
         return [
             mistake for (mistake, _), rank in zip(seen, ranks, strict=True) if rank == max(ranks)

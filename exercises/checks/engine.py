@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import traceback
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
@@ -162,7 +163,7 @@ def check(
 
     `past` is what was handed in before, of the same notebook; the answer is added to it.
     """
-    past = Attempts() if past is None else past
+    past = past or Attempts()
     past.wrong.pop(question.name, None)
     try:
         result = _Check(posed(question, exercise), answer, seconds, past).result()
@@ -224,7 +225,12 @@ class _Check:
                 UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it"
             )
         try:
-            with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
+            # what other arguments and other keys lead to is no news
+            with (
+                time_limit(DIAGNOSIS),
+                np.errstate(all="ignore"),
+                warnings.catch_warnings(action="ignore"),
+            ):
                 return self._wrong(answered)
         except OutOfTime:
             return self._says(WRONG, f"not right. {GENERAL}")

@@ -119,9 +119,6 @@ def _array(answer: Any, expected: np.ndarray) -> np.ndarray:
             if np.abs(array.imag).max(initial=0.0) > ROUNDED * np.abs(array).max(initial=0.0):
                 raise Unusable("got complex numbers: was a root taken of something negative?")
             array = array.real
-        # it always has two axes
-        if isinstance(answer, np.matrix) and expected.ndim < 2 and array.size == expected.size:
-            array = array.reshape(expected.shape)
         if array.dtype.kind not in "biufO":
             raise TypeError
         array = array.astype(float)

@@ -83,7 +83,7 @@ class Slip:
     order : int
         Of the moment.
     lost : Node, optional
-        The term that is lost, of the line above.
+        The term or bracket that is lost, of the line above.
     above : bool
         Whether the path is one of the line above: of the term that something else was made of.
     """
@@ -114,6 +114,11 @@ def named(root: Node, path: Path) -> Path:
     return max([term_path(root, path), *functions], key=len)
 
 
+def multiplied(root: Node, path: Path) -> bool:
+    """Whether a node stands in a factor of something."""
+    return any(at(root, path[:i]).kind == PRODUCT for i in range(len(path)))
+
+
 def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
     """The slips that explain a line best, at most two of different terms; none if no single change
     does."""
@@ -135,11 +140,23 @@ class _Search:
         self.pool = sorted(free)
         self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
         self.mine, self.theirs = (self.values.of(tree, keep=True) for tree in both)
+        inner = list(walk(self.above))
         self.terms = [
-            (sign, term)
-            for _, node in walk(self.above)
+            (sign, term, multiplied(self.above, path))
+            for path, node in inner
             if node.kind == SUM
             for sign, term in zip(node.data, node.parts, strict=True)
+        ]
+        brackets = {
+            written(part): part
+            for _, node in inner
+            if node.kind == PRODUCT
+            for part in node.parts
+            if part.kind == SUM
+        }
+        self.factors: list[tuple[str, Node | None, Node]] = [
+            *((name, None, power(letter(name), k)) for name in self.pool for k in (1, 2)),
+            *(("", part, part) for part in brackets.values()),
         ]
 
     def best(self) -> list[Slip]:
@@ -280,14 +297,15 @@ class _Search:
             for q in NUMBERS:
                 kind, new = "sign" if q == -1 else "factor", product(number(q), node)
                 yield slip(kind, new, more=0.35 * (node.kind == LETTER and beside))
-            for name in self.pool:
-                for k in (1, 2):
-                    yield slip("lost-factor", product(power(letter(name), k), node), name)
+            for name, lost, factor in self.factors:
+                yield slip("lost-factor", product(factor, node), name, lost=lost)
         if outer is None or outer.kind != SUM:
-            for _, term in self.terms:
+            odd = outer is not None and outer.kind == PRODUCT and node.kind != SUM
+            for _, term, _ in self.terms:
                 for lost in (term, mean(term)):
                     for sign in (1, -1):
-                        yield slip("lost", total(node, lost, signs=(1, sign)), lost=term)
+                        sum_ = total(node, lost, signs=(1, sign))
+                        yield slip("lost", sum_, more=0.2 * odd, lost=term)
 
     def _moments(self) -> Iterator[tuple[Node, Node, int]]:
         """Wrong and right moments of the normal law, and their order; of functions, too."""
@@ -334,7 +352,7 @@ class _Search:
 
     def _unlikely(self, slip: Slip) -> float:
         """An addition to the cost of changing a term that is nothing, or that stands in the line
-        above as it is."""
+        above as it is, where it stands: in a bracket that is multiplied, or not."""
         if slip.above or slip.kind in (FORGOTTEN, "doubled", "extra", "lost"):
             return 0.0
         path = term_path(self.line, slip.path)
@@ -342,7 +360,9 @@ class _Search:
         if path:
             value = value * at(self.line, path[:-1]).data[path[-1]]
         stays = path and any(
-            self._same(value, sign * self.values.of(term)) for sign, term in self.terms
+            self._same(value, sign * self.values.of(term))
+            for sign, term, inside in self.terms
+            if inside == multiplied(self.line, path)
         )
         return 0.35 if stays or np.all(np.abs(value) <= 1e-10) else 0.0
 

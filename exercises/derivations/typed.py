@@ -71,8 +71,6 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
             "; write ** for a power (x**2)", ""
         )
         raise FormulaError(text, problem, columns[min(error.column, len(columns) - 1)]) from None
-    except RecursionError:
-        raise FormulaError(text, "the line is nested too deeply; split the step up") from None
 
 
 class _Lines(Reader):

@@ -85,6 +85,14 @@ def described(
         return f"what has been made of {where} is not right{_moment(slip)}"
     place = named(line, slip.path)
     term = shown(text, at(line, place))
+    quoted = (
+        f"`{shown(text_above, slip.lost)}`"
+        if slip.lost is not None and slip.lost.span and text_above
+        else ""
+    )
+    factor = slip.name or quoted
+    of_above = f" of the line above, {quoted}" if quoted else ""
+    one_with = f", one with {slip.name}" if slip.name else ""
     of = "the sign of" if place == term_path(line, slip.path) else "a sign in"
     says = {
         "sign": f"{of} `{term}` is not right",
@@ -96,9 +104,9 @@ def described(
         "factor": f"a number in `{term}` is not right",
         "noise-forgotten": f"the mean square of the noise {slip.name} is forgotten: its part is "
         "missing",
-        "lost-factor": f"a factor is lost from `{term}`: {slip.name}",
+        "lost-factor": f"a factor is lost from `{term}`{': ' * bool(factor)}{factor}",
         "extra": f"{'something in ' if slip.name else ''}`{term}` does not belong there",
-        "lost": f"a term is lost{_lost(slip, text_above)}, in `{term}`",
+        "lost": f"a term is lost{of_above or one_with}, in `{term}`",
     }
     return says[slip.kind]
 
@@ -107,12 +115,6 @@ def _moment(slip: Slip) -> str:
     if slip.kind == "moment" and not slip.order:
         return ": the mean of a function, a square or a product is not that of means"
     return f": it takes a moment of order {slip.order} for another one" if slip.order else ""
-
-
-def _lost(slip: Slip, text_above: str) -> str:
-    if slip.lost is not None and slip.lost.span and text_above:
-        return f" of the line above, `{shown(text_above, slip.lost)}`"
-    return f", one with {slip.name}" if slip.name else ""
 
 
 def _role(setting: Setting, name: str) -> str:

@@ -12,7 +12,7 @@ from nbformat import NotebookNode
 
 from kfcourse.exercises.checks import exercise
 from kfcourse.exercises.grading.submissions import Cell, syntax
-from kfcourse.exercises.notebooks.master import render, student
+from kfcourse.exercises.notebooks.master import CHECK, render, student
 
 
 @lru_cache(maxsize=64)
@@ -28,9 +28,6 @@ def check_cells(master: NotebookNode) -> dict[str, list[str]]:
         for cell in master.cells
         if cell.cell_type == "code" and _asked(cell.source)
     }
-
-
-CHECK = re.compile(r"""(\w+)\.check\(\s*["'](\w+)["']""")
 
 
 def _asked(source: str) -> list[str]:

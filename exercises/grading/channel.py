@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import json
+import os
 import queue
 import threading
 import time
 from typing import IO, Any
 
 from kfcourse.exercises.grading.values import LARGEST, ProtocolError
+
+
+def close_streams() -> None:
+    """Nothing reads standard input any more, or writes to output and errors."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nowhere, stream)
 
 
 class Closed(EOFError):

@@ -52,7 +52,7 @@ def grade_folder(
     """Grade the notebooks of a folder as `kfcourse grade` is asked to; whether all could be
     graded."""
     course = None if students is None else _course(students, variants_file)
-    folder, masters = folder.resolve(), masters and masters.resolve()
+    folder = folder.resolve()
     work = returned(folder, seconds, variants_file, masters, _given(course))
     if not work:
         raise ValueError(f"no notebooks (*.ipynb) in {folder}")
@@ -115,14 +115,9 @@ def _course(path: Path, variants_file: Path | None) -> list[Student]:
     course = read_assignment(path, known)
     for student in course:
         if student.variant not in known:
-            hint = (
-                f"there are {', '.join(known)}"
-                if variants_file
-                else "name the file that you handed out with --variants"
-            )
             raise ValueError(
                 f"{path} gives {student.name} the variant {student.variant}, which is not known; "
-                f"{hint}"
+                f"name the file that you handed out with --variants; known are {', '.join(known)}"
             )
     return course
 

@@ -23,6 +23,7 @@ from queue import SimpleQueue
 from tqdm import tqdm
 
 from kfcourse.exercises.grading import marking, sandbox
+from kfcourse.exercises.grading.channel import close_streams
 from kfcourse.exercises.grading.marking import Setting
 from kfcourse.exercises.grading.results import FAILED, Grade
 from kfcourse.exercises.grading.running import MEMORY, START, WHOLE
@@ -79,9 +80,7 @@ def _begin() -> None:
     """In a new grading process: Ctrl-C and the screen are the command's, and without the command it
     ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nowhere, stream)
+    close_streams()
     parent = multiprocessing.parent_process()
     assert parent is not None
 

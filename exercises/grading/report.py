@@ -156,20 +156,16 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
             (question, grade.results[question.name], worth(grade, question, credit))
             for question in sets()[letter].questions
         ]
-        got = points([grade] if grade else [], credit)
-        parts.append((sets()[letter], grade, rows, got, possible([letter])))
-    came = list(person.grades.values())
+        parts.append((sets()[letter], grade, rows, possible([letter])))
+    (row,) = student_rows([person], letters, credit)
     return _page(
         "feedback",
         person=person,
         sets=parts,
-        levels=[
-            (level, points(came, credit, level), possible(letters, level)) for level in WEIGHTS
-        ],
+        row=row,
+        levels=[(level, row[level], possible(letters, level)) for level in WEIGHTS],
         signs=SIGNS,
         weights=WEIGHTS,
-        points=points(came, credit),
-        of=possible(letters),
     )
 
 

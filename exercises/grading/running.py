@@ -34,7 +34,6 @@ MEMORY = 4 * 2**30  # bytes of a notebook's process
 START = 60.0  # seconds until a process answers
 GRACE = 3.0  # seconds after which a process that stops nothing is stopped
 ANSWER = 18.0  # seconds that one call of an answer may take, where a cell may not take less
-ANSWERS = 45.0  # all calls of it, those of the search for the kind of mistake included
 KILLED = "its process was killed, by the notebook, by somebody else, or for want of memory"
 
 
@@ -232,21 +231,16 @@ class Answer:
     """A function of a notebook's, called in its process."""
 
     def __init__(self, kernel: Kernel, question: str):
-        self._kernel, self._question, self._left = kernel, question, ANSWERS
-        self._most = min(ANSWER, kernel.seconds)
+        self._kernel, self._question = kernel, question
+        self._seconds = min(ANSWER, kernel.seconds)
         self.killed = False  # while it was called
 
     def __call__(self, *arguments: Any) -> Any:
-        if self._left <= 0:
-            raise OutOfTime
-        start = time.monotonic()
         try:
-            return self._kernel.ask(self._question, arguments, min(self._most, self._left))
+            return self._kernel.ask(self._question, arguments, self._seconds)
         except Stopped as reason:
             self.killed |= isinstance(reason, Killed)
             raise Unusable(str(reason)) from None
-        finally:
-            self._left -= time.monotonic() - start
 
 
 KEPT = re.compile(

@@ -23,7 +23,7 @@ from traitlets.config import Config
 from kfcourse.exercises import sets
 from kfcourse.exercises.checks import Exercise, Result, exercise
 from kfcourse.exercises.checks.engine import in_a_line, in_library
-from kfcourse.exercises.grading.channel import Channel, Closed
+from kfcourse.exercises.grading.channel import Channel, Closed, close_streams
 from kfcourse.exercises.grading.values import decode, encode
 from kfcourse.limits import OutOfTime, limit_process, time_limit
 
@@ -157,9 +157,7 @@ def main() -> None:
     """The process: messages come and go where standard input and output were, which are closed to
     the notebook."""
     channel = Channel(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nowhere, stream)
+    close_streams()
     sys.meta_path[:] = [
         finder
         for finder in sys.meta_path

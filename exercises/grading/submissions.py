@@ -109,14 +109,16 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
         for name in folders:
             if (path := Path(at, name)).is_symlink():
                 yield path, LINK
-        for path in (Path(at, name) for name in files):
+        for name in files:
+            path = Path(at, name)
             kind = path.suffix.lower()
             notebook = path.with_name(
                 path.name[: len(path.name) - len(kind)].removesuffix(".ipynb") + ".ipynb"
             )
+            if path.parent.name == ".ipynb_checkpoints" or name.startswith("._"):
+                continue  # Jupyter's, or a Mac's
             if kind == ".ipynb":
-                if not _is_copy(path):
-                    yield path, _unread(path, path.relative_to(folder))
+                yield path, _unread(path, path.relative_to(folder))
             elif path.stem.lower().endswith(".ipynb"):
                 if kind not in (".bak", ".swp"):
                     yield path, RENAMED
@@ -124,15 +126,6 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
                 yield path, NOT_READ[kind]
     for error in unread:
         yield Path(error.filename), f"a folder that cannot be read: {error.strerror}"
-
-
-def _is_copy(path: Path) -> bool:
-    """Whether a program has made it beside a notebook that is there: Jupyter its checkpoints, a Mac
-    its `._` files."""
-    if path.parent.name == ".ipynb_checkpoints":
-        return (path.parent.parent / f"{path.stem.removesuffix('-checkpoint')}.ipynb").exists()
-    at = Path(*(part for part in path.parent.parts if part != "__MACOSX"))
-    return path.name.startswith("._") and (at / path.name[2:]).exists()
 
 
 def _unread(path: Path, inside: PurePath) -> str:
@@ -228,30 +221,12 @@ def claimed(claim: Any, variants_file: Path | None, given: str = "") -> tuple[Ex
     try:
         variant = find_variant(given or name, variants_file)
     except VariantError as error:
-        hint = (
-            ""
-            if variants_file
-            else f"if variant {given or name} is of a file of yours, name that with --variants; "
-        )
         # the advice first: the list may be long, and is cut in the table
-        raise Unreadable(f"{hint}{error}") from None
+        raise Unreadable(
+            f"if variant {given or name} is of a file of yours, name that with --variants; {error}"
+        ) from None
     marked = f"for variant {name}, and marked as variant {variant.name}, which was given"
     return Exercise(letter, variant), [clean(marked)] if given and name != given else []
-
-
-def openings(source: str) -> Iterator[tuple[Any, Any]]:
-    """Arguments of the calls exercise("a", ...) in a cell, where they are literals."""
-    for node in ast.walk(syntax(source) or ast.Module([], [])):
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id == "exercise"
-        ):
-            with suppress(ValueError, TypeError):
-                arguments = [ast.literal_eval(argument) for argument in node.args]
-                named = {keyword.arg: ast.literal_eval(keyword.value) for keyword in node.keywords}
-                letter, variant, *_ = [*arguments, *named.values(), None, None]
-                yield letter, variant
 
 
 def syntax(source: str) -> ast.Module | None:

@@ -94,20 +94,10 @@ def _text(formula: sp.Expr) -> str:
 def _array(value: Any, functions: Functions | None) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "O":
-        return [
-            "objects",
-            list(array.shape),
-            [encode(entry, functions) for entry in array.ravel().tolist()],
-        ]
+        return encode(array.tolist(), functions)
     if array.dtype.kind not in "biufc":
         return ["other", f"array of {array.dtype.name}"]
-    kind = (
-        "scalar"
-        if isinstance(value, np.generic | complex)
-        else "matrix"
-        if isinstance(value, np.matrix)
-        else "array"
-    )
+    kind = "scalar" if isinstance(value, np.generic | complex) else "array"
     data = io.BytesIO()
     np.save(data, array, allow_pickle=False)
     return [kind, base64.b64encode(data.getvalue()).decode()]
@@ -138,19 +128,12 @@ def _decoded(data: Any, proxies: Proxies | None) -> Any:
         case ["list" | "tuple" as kind, list(parts)]:
             values = [_decoded(part, proxies) for part in parts]
             return values if kind == "list" else tuple(values)
-        case ["array" | "scalar" | "matrix" as kind, str(text)]:
+        case ["array" | "scalar" as kind, str(text)]:
             array = np.load(io.BytesIO(base64.b64decode(text, validate=True)), allow_pickle=False)
             if array.dtype.kind not in "biufc":
                 raise ProtocolError(f"an array of {array.dtype}")
             array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
-            return (
-                array[()] if kind == "scalar" else np.asmatrix(array) if kind == "matrix" else array
-            )
-        case ["objects", list(shape), list(parts)]:
-            array = np.empty(len(parts), dtype=object)
-            for place, part in enumerate(parts):
-                array[place] = _decoded(part, proxies)
-            return array.reshape(shape)
+            return array[()] if kind == "scalar" else array
         case ["formula", str(text)]:
             return formula(text)
         case ["formulas", int(rows), int(columns), list(texts)]:

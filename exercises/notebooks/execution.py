@@ -79,18 +79,13 @@ def execute(notebook: NotebookNode, name: str) -> NotebookNode:
         client.resources = {"metadata": {"path": folder}}
         try:
             client.execute()
-        except CellExecutionError as error:
-            raise NotebookFailed(
-                f"{name}, cell {started[-1]}: {error.ename}: {error.evalue}"
-            ) from None
-        except CellTimeoutError:
-            raise NotebookFailed(
-                f"{name}, cell {started[-1]}: still running after {SECONDS:g} s"
-            ) from None
-        except DeadKernelError:
-            raise NotebookFailed(
-                f"{name}, cell {started[-1]}: the kernel died (out of memory?)"
-            ) from None
+        except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
+            why = "the kernel died (out of memory?)"
+            if isinstance(error, CellExecutionError):
+                why = f"{error.ename}: {error.evalue}"
+            elif isinstance(error, CellTimeoutError):
+                why = f"still running after {SECONDS:g} s"
+            raise NotebookFailed(f"{name}, cell {started[-1]}: {why}") from None
     if failure := first_error(result):
         cell, shown = failure
         raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")

@@ -120,11 +120,10 @@ def make(job: Job) -> Outcome:
 def _write(job: Job, notebook: NotebookNode, executed: NotebookNode) -> None:
     """The job's files; the notebook last, because its being there tells that all are."""
     job.folder.mkdir(parents=True, exist_ok=True)
-    if job.kind == "exercises":
-        save(nbformat.writes(student(notebook, pictures(executed))), job.target)
-        return
-    if job.kind == "nbgrader":
-        save(nbformat.writes(source_notebook(notebook)), job.target)
+    if job.kind != "solutions":
+        own = job.kind == "exercises"
+        made = student(notebook, pictures(executed)) if own else source_notebook(notebook)
+        save(nbformat.writes(made), job.target)
         return
     page, printed = job.target.with_suffix(".html"), job.target.with_suffix(".pdf")
     save(html(executed, job.name), page)

@@ -43,6 +43,7 @@ from kfcourse.symbolic.model import Model
 
 BEGIN, END = "BEGIN SOLUTION", "END SOLUTION"
 STUBS = STUB, _ = "# YOUR CODE HERE", "raise NotImplementedError"
+CHECK = re.compile(r"""(\w+)\.check\(\s*["'](\w+)["']""")  # the exercise's name, the question
 
 
 class MasterError(ValueError):
@@ -90,12 +91,12 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
     except jinja2.UndefinedError as error:
         raise MasterError(f"master {name}: {error.message}") from None
     notebook = jupytext.reads(filled, fmt="md:myst")
-    answers = iter(sets()[exercise.letter].questions)
     for index, cell in enumerate(notebook.cells):
         cell.id = f"{exercise.letter}-{index:02d}"
         _check_markers(cell.source, f"master {name}, cell {index + 1}")
         if cell.cell_type == "code" and STUB in without_solution(cell.source, code=True):
-            cell.metadata["kfcourse"] = {"answer": _defined(cell.source, next(answers, None))}
+            names = re.findall(r"^def (\w+)", cell.source, re.MULTILINE)
+            cell.metadata["kfcourse"] = {"answer": "".join(names[:1])}
     notebook.metadata["kfcourse"] = {"set": exercise.letter, "variant": exercise.variant.name}
     notebook.metadata["kernelspec"] = {
         "display_name": "Python 3",
@@ -103,12 +104,6 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
         "name": "python3",
     }
     return notebook
-
-
-def _defined(source: str, question: Any) -> str:
-    """Name of the function that an answer cell defines."""
-    match = re.search(r"^def (\w+)", source, re.MULTILINE)
-    return match.group(1) if match else getattr(question, "name", "")
 
 
 def _check_markers(source: str, where: str) -> None:
@@ -143,15 +138,12 @@ def without_solution(source: str, code: bool) -> str:
     return "\n".join(kept) if any(line.strip() not in ("", *STUBS) for line in kept) else ""
 
 
-def without_markers(source: str) -> str:
-    return "\n".join(line for line in source.splitlines() if BEGIN not in line and END not in line)
-
-
 def solution(notebook: NotebookNode) -> NotebookNode:
     """The worked solution: the complete notebook without the marker lines."""
     result = nbformat.from_dict(notebook)
     for cell in result.cells:
-        cell.source = without_markers(cell.source)
+        lines = cell.source.splitlines()
+        cell.source = "\n".join(line for line in lines if BEGIN not in line and END not in line)
     return result
 
 

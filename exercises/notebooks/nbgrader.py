@@ -3,17 +3,14 @@ are worth points."""
 
 from __future__ import annotations
 
-import re
-
 import nbformat
 from nbformat import NotebookNode
 
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.checks.question import WEIGHTS
-from kfcourse.exercises.notebooks.master import BEGIN, without_solution
+from kfcourse.exercises.notebooks.master import BEGIN, CHECK, without_solution
 
 SCHEMA = 3  # version of nbgrader's metadata
-CHECK = re.compile(r"""^(\w+\.check\(\s*["'](\w+)["'].*\))\s*$""")
 
 
 def source_notebook(notebook: NotebookNode) -> NotebookNode:
@@ -33,8 +30,8 @@ def source_notebook(notebook: NotebookNode) -> NotebookNode:
         if cell.cell_type != "code":
             cell.source = without_solution(cell.source, code=False)
         elif asked:
-            call, question = asked.groups()
-            cell.source = f"result = {call}\nassert result.passed, result"
+            question = asked[2]
+            cell.source = f"result = {cell.source.strip()}\nassert result.passed, result"
             cell.metadata["nbgrader"] = _marked(question, grade=True, locked=True) | {
                 "points": WEIGHTS[levels[question]]
             }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import re
 import unicodedata
@@ -15,25 +14,11 @@ from kfcourse.files import save
 
 FORMULA = ("=", "+", "-", "@")  # full-width ones are taken for these
 GUARD = "'"
-LONGEST = 200  # bytes of a name: most systems take 255
 
 
 def safe(name: str) -> str:
-    """A name as one component of a path, on every system: Windows keeps CON and others for devices.
-
-    What is longer than a file's name may be, with an ending and what a temporary file adds, is cut,
-    and ends in its hash.
-    """
-    part = re.sub(r"[^\w.-]+", "-", unicodedata.normalize("NFC", name)).strip(".-") or "unnamed"
-    if len(part.encode()) > LONGEST:
-        cut = part.encode()[: LONGEST - 9].decode(errors="ignore")
-        part = f"{cut}-{hashlib.sha256(part.encode()).hexdigest()[:8]}"
-    stem, *rest = part.split(".", 1)
-    return (
-        ".".join((f"{stem}_", *rest))
-        if re.fullmatch(r"(?i)con|prn|aux|nul|com\d|lpt\d", stem)
-        else part
-    )
+    """A name as one component of a path, on every system."""
+    return re.sub(r"[^\w.-]+", "-", unicodedata.normalize("NFC", name)).strip(".-") or "unnamed"
 
 
 def clean(text: str, length: int = 200) -> str:

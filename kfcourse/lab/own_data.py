@@ -89,7 +89,8 @@ class Analysis(NamedTuple):
         ]
         if self.gate is not None:
             refused = np.flatnonzero(weight < 1) + 1
-            where = ": rows " + ranges(refused[:MANY].tolist()) if len(refused) else ""
+            rows = f": row{'s' * (len(refused) > 1)} {ranges(refused[:MANY].tolist())}"
+            where = rows if len(refused) else ""
             more = ", ..." if len(refused) > MANY else ""
             sentences.append(
                 f"The gate refused {len(refused)} of {steps - missing} measurements{where}{more}."

@@ -31,13 +31,10 @@ def complete_square(exponent: sp.Expr, variable: sp.Symbol) -> Square:
 
     Raises
     ------
-    ValueError
+    ValueError, PolynomialError
         If the exponent is not quadratic in the variable.
     """
-    try:
-        b, a, d = sp.Poly(exponent, variable).all_coeffs()
-    except (sp.PolynomialError, ValueError):
-        raise ValueError(f"the exponent is not quadratic in {variable}: {exponent}") from None
+    b, a, d = sp.Poly(exponent, variable).all_coeffs()
     return Square(sp.factor(-a / (2 * b)), sp.factor(-1 / (2 * b)), d - sp.factor(a**2 / (4 * b)))
 
 

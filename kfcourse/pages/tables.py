@@ -29,12 +29,9 @@ def table(
     Raises
     ------
     ValueError
-        If there is no column, or their lengths differ.
+        If their lengths differ.
     """
     listed = {heading: list(entries) for heading, entries in columns.items()}
-    lengths = {heading: len(entries) for heading, entries in listed.items()}
-    if len(set(lengths.values())) != 1:
-        raise ValueError(f"a table needs columns of one length, not {lengths or 'none'}")
     cells, rules = [], []
     for heading, entries in listed.items():
         style = formats if isinstance(formats, str) else formats.get(heading, "")

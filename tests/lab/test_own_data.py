@@ -142,7 +142,7 @@ def test_times_keep_all_their_digits(no_figures, call, place):
     rows = [f"{stamp},{1 + k % 2},{1e3 if k == 3 else 1}" for k, stamp in enumerate(stamps)]
     (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows]))
     arguments = "stamps.csv --model my.toml --variant plane --gate 0.999 --out out"
-    assert "refused 1 of 6 measurements: rows 4" in call(arguments).output
+    assert "refused 1 of 6 measurements: row 4." in call(arguments).output
     assert_array_equal(numbers(place / "out" / "estimate.csv")["time"], stamps)
     (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows[:2], rows[0]]))
     assert "1484649904.25 comes after 1484649904.75" in call(arguments).output

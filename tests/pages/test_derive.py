@@ -24,6 +24,7 @@ BY_HAND = [
     "variant 5\nS = M[sin(x)^2]\n = sin(m)^2*exp(-d)\nG = -g*cos(m)*exp(d/2)\nG = g*cos(m)\nG = "
     "g*cos(m)*exp(d/2)",
     "variant 53\nS = g^2*d + f^2*M[x^4]\n = g^2*d + f^2*M[x]*M[x^3]\nS = M[x*sin(x)]\n = m*M[sin(x)]",
+    "W = u*(p + z^2) + (1 - u)*q\n = u*p + q + u*z^2\nV = W\n = u*p + (1 - u)*q",
     "variant 21\nlinearised\nF11 = cos(m1)^2*d11 + r^2\n = (1 - sin(m1)^2)*d11 + r",
 ]
 

@@ -141,7 +141,7 @@ ANSWERING = {
     "fig-two-beats": (
         ["Measured distance"],
         (1.96,),
-        [(0, "ArrowLeft", 1.94), (0, "Home", 0), (0, "End", 5.5), (0, "PageDown", 5.3)],
+        [(0, "ArrowLeft", 1.94), (0, "End", 5.5), (0, "PageDown", 5.3)],
         [(0, -60, 0, "place")],
         by_quadrature,
         # the mean's density is read at the nearest of nodes 0.0375 apart, and changes by 1/sd times
@@ -152,11 +152,8 @@ ANSWERING = {
         ["λ, mean of x", "Ψ, variance of x (rad²)"],
         (1, 0.4),
         [
-            (0, "ArrowLeft", 0.95),
             (1, "ArrowRight", 0.42),
-            (0, "PageUp", 1.45),
-            (1, "End", 1),
-            (0, "Home", -2),
+            (0, "PageUp", 1.5),
             (1, "Home", 0.02),
             (0, "End", 3.5),
         ],
@@ -168,12 +165,9 @@ ANSWERING = {
         ["Prediction λ", "Measurement y", "p before, of the GAOF"],
         (2, 3, 0.006),
         [
-            (0, "ArrowRight", 2.05),
             (1, "PageDown", 2.5),
             (2, "End", 0.02),
             (0, "Home", -2.8),
-            (2, "Home", 1e-5),
-            (1, "Home", -3.8),
         ],
         [(0, 90, 0, "lambda"), (1, 60, 0, "y")],
         gains_and_estimates,
@@ -183,11 +177,9 @@ ANSWERING = {
         ["Measurement at step 1", "Q, of the kicks", "R, of the meter"],
         (5, 0.25, 1),
         [
-            (0, "ArrowDown", 4.9),
             (0, "Home", -6),
             (1, "End", 100),
             (2, "Home", 0.01),
-            (2, "End", 100),
         ],
         [(0, 30, -80, "y")],
         estimates,

@@ -1,4 +1,4 @@
-"""The live page in a real browser: its numbers are the package's; it works by mouse, finger and
+"""The live page in a real browser: its numbers are the package's; it works by mouse and
 keyboard, without a network."""
 
 import json
@@ -76,11 +76,6 @@ def test_a_recording_is_the_track_and_its_noise():
         assert_allclose(truth, noisy.state[::every, 0, :2], atol=0.5001e-3)
         assert_allclose(y, noisy.y[::every], atol=4.6e-3)
     assert_array_equal(recording.position, recording.position.round(3))
-
-
-def test_an_interval_beside_the_grid_is_refused():
-    with pytest.raises(ValueError, match=r"multiple of 0.01 s"):
-        RECORDING.sampled(0.015, 8.0)
 
 
 # ---------------------------------------------------------------- the browser
@@ -349,7 +344,7 @@ def test_its_file_is_a_record_of_the_chapter_s_model(opened, tmp_path):
     assert 0.25 < np.isnan(y).all(axis=-1).mean() < 0.35
 
 
-# ---------------------------------------------------------------- by mouse and finger
+# ---------------------------------------------------------------- by mouse
 
 
 def circle(tab, move, seconds: float) -> None:
@@ -366,7 +361,8 @@ def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     tab = opened()
     tab.mouse.move(5, 5)
     assert text(tab, "count") == INTRODUCED
-    circle(tab, tab.mouse.move, 2.0)
+    circle(tab, tab.mouse.move, 2.0)  # a finger is followed alike, and does not scroll
+    assert tab.locator("canvas").evaluate("e => getComputedStyle(e).touchAction") == "none"
     assert text(tab, "phase") == "ready" and status(tab) == "The filter is ready."
     tab.mouse.move(5, 5)
     count, seconds = re.fullmatch(r"(\d+) in (\d+\.\d\d) s", text(tab, "count")).groups()
@@ -379,21 +375,3 @@ def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     assert text(tab, "count") == f"{count} in {seconds} s"  # ended when the mouse left
     press(tab, "Clear")
     assert text(tab, "count") == "–"
-
-
-@pytest.mark.slow
-def test_a_finger(opened):
-    """The browser does not take it for scrolling."""
-    tab = opened(has_touch=True, is_mobile=True, viewport={"width": 400, "height": 900})
-    session = tab.context.new_cdp_session(tab)
-
-    def touch(kind, *points):
-        touches = [{"x": x, "y": y} for x, y in points]
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
-
-    box = tab.locator("canvas").bounding_box()
-    touch("touchStart", (box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2))
-    circle(tab, lambda x, y: touch("touchMove", (x, y)), 2.0)
-    touch("touchEnd")
-    assert status(tab).startswith("Your track, ") and is_cleaner(tab)
-    assert tab.evaluate("[scrollX, scrollY]") == [0, 0]

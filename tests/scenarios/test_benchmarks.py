@@ -6,14 +6,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from kfcourse import simulate
 from kfcourse.scenarios.benchmarks import (
     cubic_sensor,
     inverse_cube_root,
     logistic,
     lorenz,
     lorenz_data,
-    reentry,
 )
 from kfcourse.symbolic.equations import compile_noiseless
 
@@ -37,16 +35,6 @@ def test_the_attractor_is_that_of_lorenz():
     noise = (y - x)[seen]
     assert abs(noise.std() / np.sqrt(2) - 1) < 4 / np.sqrt(2 * noise.size)
     assert_allclose(x[1:], step(x[:-1]), rtol=1e-9, atol=1e-9)  # nothing disturbs it
-
-
-def test_the_reentry_of_the_source():
-    """Newton's law and the drag, in plain numbers."""
-    x, _ = simulate(reentry(known=True), 20, 2, seed=1)
-    r, speed = np.hypot(x[0, 0, 0], x[0, 0, 1]), np.hypot(x[0, 0, 2], x[0, 0, 3])
-    drag = -0.59783 * np.exp(0.6932) * np.exp((6374 - r) / 13.406) * speed
-    following = x[0, 0, 2:4] + 0.1 * (drag * x[0, 0, 2:4] - 3.986e5 / r**3 * x[0, 0, :2])
-    assert (np.abs(x[1, 0, 2:4] - following) < 5 * np.sqrt(2.4064e-5)).all()
-    assert (x[:, :, 4] == 0.6932).all() and np.ptp(x[-1, :, 0]) > 0
 
 
 def test_the_conditionally_minimax_models_are_those_of_the_source():

@@ -10,7 +10,6 @@ from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import (
     cartesian,
-    kinematic,
     measure_cartesian,
     measure_spherical,
     spherical,
@@ -58,7 +57,6 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
     ("change", "message"),
     [
         ({"interval": 0.0}, "interval must be positive"),
-        ({"speeds": (200.0, -1.0)}, "speeds must be positive"),
         ({"radii": (6e3, np.inf)}, "radii must be positive and finite"),
         ({"ramp": 30.0}, "part 3 lasts 60 s, no longer than its two ramps"),
         ({"descent": 40.0}, "lower `descent`"),
@@ -96,7 +94,6 @@ def test_measurements_have_the_given_errors():
     [
         ((1.0, 2.0), 3, "one number or three"),
         (-1.0, 3, "not negative"),
-        (1.0, 0, "runs must be"),
     ],
 )
 def test_measurements_that_cannot_be_are_refused(sigmas, runs, message):
@@ -105,18 +102,6 @@ def test_measurements_that_cannot_be_are_refused(sigmas, runs, message):
 
 
 # --- models and errors
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"dimensions": 4}, "dimensions must be 1, 2 or 3"),
-        ({"noise_sd": np.nan}, "noise_sd must be finite and not negative"),
-    ],
-)
-def test_kinematic_models_that_cannot_be_are_refused(change, message):
-    with pytest.raises(ValueError, match=message):
-        kinematic(**({"interval": 1.0} | change))
 
 
 def test_rms_by_part_by_hand():

@@ -10,7 +10,6 @@ from kfcourse.scenarios.pointer import (
     SHORTEST,
     follow,
     hand_track,
-    sample,
     start_up,
     uniform_acceleration,
 )
@@ -29,9 +28,6 @@ def test_the_matrices_are_those_of_the_radar_and_the_input_pushes_as_the_noise(a
     for name in ("A", "H", "Q", "R"):
         assert_allclose(getattr(system, name), getattr(expected, name), rtol=1e-13)
     assert_allclose(system.B, np.kron([[dt**2 / 2], [dt]], np.eye(axes)), rtol=1e-14)
-
-
-# ---------------------------------------------------------------- start-up
 
 
 # ---------------------------------------------------------------- the filter
@@ -78,18 +74,12 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
 def test_arguments_that_do_not_fit():
     y = np.zeros((5, 1, 2))
     system = uniform_acceleration(0.1, 1.0, 1.0)
-    missing = y.copy()
-    missing[1, 0, 0] = np.nan
     for call, message in (
         (lambda: uniform_acceleration(0.0, 1.0, 1.0), "interval must be positive and finite"),
-        (lambda: sample(hand_track(1), np.nan, 1.0, 1, 0), "interval must be positive and finite"),
         (lambda: uniform_acceleration(0.1, -1.0, 1.0), "acceleration_sd must be finite and not"),
-        (lambda: uniform_acceleration(0.1, 1.0, np.nan), "measurement_sd must be finite and not"),
         (lambda: start_up(y, 0.1, np.eye(2)), "three complete samples of two coordinates"),
-        (lambda: start_up(missing[:3], 0.1, np.eye(2)), "missing 1"),
         (lambda: follow(system, y[:3], 0.1), "more than three samples"),
         (lambda: hand_track(1, strokes=0), "strokes must be a positive whole number"),
-        (lambda: sample(hand_track(1), 0.1, -1.0, 1, 0), "measurement_sd must be finite and not"),
         (lambda: follow(system, y, 0.2), "made for an interval of 0.1 s, and the samples have 0.2"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -576,7 +576,9 @@
       this.values = new Values(setting, free.size + 10, "slip");
       [this.mine, this.theirs] = [line, above].map((one) => this.values.of(one));
       this.inverse = pseudoInverse(this.mine.map((_, p) => [1, ...this.letters.map((name) => Math.log(Math.abs(this.values.letter(name)[p])))]));
-      this.terms = walk(above).filter(([, one]) => one.kind === "sum").flatMap(([, one]) => one.parts.map((part, i) => [one.data[i], part]));
+      this.terms = walk(above).filter(([, one]) => one.kind === "sum").flatMap(([path, one]) => one.parts.map((part, i) => [one.data[i], part, multiplied(above, path)]));
+      const brackets = new Map(walk(above).filter(([, one]) => one.kind === "product").flatMap(([, one]) => one.parts.filter((part) => part.kind === "sum").map((part) => [asText(part), part])));
+      this.factors = [...this.pool.flatMap((name) => [1, 2].map((k) => [name, null, power(letter(name), k)])), ...[...brackets.values()].map((part) => ["", part, part])];
     }
 
     best() {
@@ -662,11 +664,11 @@
       if (kind === "product") parts.forEach((part, i) => add("extra", without(i, 1), nameOf(part), [i]));
       if (outer !== "product") {
         for (const q of NUMBERS) add(q === -1 ? "sign" : "factor", product([number(q), node]), "", [], kind === "letter" && beside ? 0.35 : 0);
-        for (const name of this.pool) for (const k of [1, 2]) add("lost-factor", product([power(letter(name), k), node]), name);
+        for (const [name, lost, factor] of this.factors) add("lost-factor", product([factor, node]), name, [], 0, lost);
       }
       if (outer !== "sum") {
         for (const [, one] of this.terms) {
-          for (const term of [one, mean(one)]) for (const sign of [1, -1]) add("lost", total([node, term], [1, sign]), "", [], 0, one);
+          for (const term of [one, mean(one)]) for (const sign of [1, -1]) add("lost", total([node, term], [1, sign]), "", [], outer === "product" && kind !== "sum" ? 0.2 : 0, one);
         }
       }
       return found;
@@ -692,7 +694,7 @@
       for (const [, call] of [...walk(this.line), ...walk(this.above)]) {
         if (call.kind === "mean") {
           const [inside] = call.parts;
-          for (const term of inside.kind === "sum" ? inside.parts : [inside]) products.set(JSON.stringify(term, (key, value) => (key === "span" ? undefined : value)), this.factors(term));
+          for (const term of inside.kind === "sum" ? inside.parts : [inside]) products.set(asText(term), this.factorsOf(term));
         }
         if (call.kind !== "call" || !ENTIRE.includes(call.data) || !states.some((x) => letters(call).has(x))) continue;
         const there = replaced(call, atMean);
@@ -719,19 +721,19 @@
       return found;
     }
 
-    factors(node) { // those that depend on the state, x^3 as three of them
-      if (node.kind === "product") return node.parts.flatMap((part) => this.factors(part));
+    factorsOf(node) { // those that depend on the state, x^3 as three of them
+      if (node.kind === "product") return node.parts.flatMap((part) => this.factorsOf(part));
       if (node.kind === "power" && [2, 3, 4, 5, 6, 7, 8].includes(node.data)) {
-        return Array(node.data).fill(this.factors(node.parts[0])).flat();
+        return Array(node.data).fill(this.factorsOf(node.parts[0])).flat();
       }
       return this.setting.states.some((x) => letters(node).has(x)) ? [node] : [];
     }
 
-    unlikely(slip) { // changing a term that is nothing, or that stands in the line above as it is
+    unlikely(slip) { // changing a term that is nothing, or that stands in the line above as it is, where it stands
       if (slip.above || [FORGOTTEN, "doubled", "extra", "lost"].includes(slip.kind)) return 0;
       const path = termPath(this.line, slip.path), sign = path.length ? at(this.line, path.slice(0, -1)).data[path[path.length - 1]] : 1;
       const value = this.values.of(at(this.line, path)).map((one) => sign * one);
-      const stays = path.length && this.terms.some(([own, one]) => same(value, this.values.of(one).map((v) => own * v)));
+      const stays = path.length && this.terms.some(([own, one, inside]) => inside === multiplied(this.line, path) && same(value, this.values.of(one).map((v) => own * v)));
       return stays || value.every((one) => Math.abs(one) <= 1e-10) ? 0.35 : 0;
     }
 
@@ -743,6 +745,8 @@
     }
   }
 
+  const multiplied = (root, path) => path.some((_, i) => at(root, path.slice(0, i)).kind === "product");
+  const asText = (node) => JSON.stringify(node, (key, value) => (key === "span" ? undefined : value));
   const makeSlip = (kind, path, name = "", more = {}) => ({ kind, path, name, order: 0, lost: null, above: false, ...more });
 
   function pseudoInverse(rows) { // (A^T A)^-1 A^T by Gauss and Jordan
@@ -776,7 +780,8 @@
     const role = setting.means.includes(name) ? "a mean" : setting.cov.some((row, i) => row[i] === name) ? "a variance"
       : lawLetters(setting).has(name) ? "a covariance" : setting.states.includes(name) ? "the state"
       : setting.noises.includes(name) ? "a noise" : "a parameter";
-    const lost = slip.lost && slip.lost.span && textAbove ? ` of the line above, \`${shown(textAbove, slip.lost)}\`` : name ? `, one with ${name}` : "";
+    const quoted = slip.lost && slip.lost.span && textAbove ? `\`${shown(textAbove, slip.lost)}\`` : "", factor = name || quoted;
+    const lost = quoted ? ` of the line above, ${quoted}` : name ? `, one with ${name}` : "";
     const says = {
       sign: `${place.length > termPath(line, slip.path).length ? "a sign in" : "the sign of"} \`${term}\` is not right`,
       doubled: `\`${term}\` stands there twice`,
@@ -785,7 +790,7 @@
       power: `${name || "something"} has the wrong power in \`${term}\``,
       factor: `a number in \`${term}\` is not right`,
       "noise-forgotten": `the mean square of the noise ${name} is forgotten: its part is missing`,
-      "lost-factor": `a factor is lost from \`${term}\`: ${name}`,
+      "lost-factor": `a factor is lost from \`${term}\`${factor ? ": " : ""}${factor}`,
       extra: name ? `something in \`${term}\` does not belong there` : `\`${term}\` does not belong there`,
       lost: `a term is lost${lost}, in \`${term}\``,
     };

@@ -155,7 +155,6 @@ NINE = {c: sp.Rational(9, 10)}
 @pytest.mark.parametrize(
     ("first", "second", "values", "same"),
     [
-        (sp.cos(2 * z), 1 - 2 * sp.sin(z) ** 2, {}, True),
         (sp.Symbol("other"), z, {}, False),
         (sp.Function("u")(z), z, {}, False),
         (c**2 * z, sp.Rational(81, 100) * z, NINE, True),

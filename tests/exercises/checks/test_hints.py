@@ -1,6 +1,8 @@
 """What is said of a wrong answer: what is so, and nothing that was once said of an answer of which
 it is not true; and right answers in other forms."""
 
+import warnings
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -88,8 +90,6 @@ DIVIDED = pair(Mistake("divided", "It is divided.", lambda a, b: (a + b, a / b))
 WRONG = [
     (NUMBERS, lambda a: -a, "wrong-sign", ""),
     (NUMBERS, lambda a: a / 2, "half-of-it", ""),
-    (NUMBERS, lambda a: 2 * a, "twice-of-it", ""),
-    (NUMBERS, lambda a: 1 / a, "inverse", ""),
     (MATRIX, lambda a: a.T, "transposed", ""),
     (SYMBOLS, lambda a: a.T, "transposed", ""),
     (CARRIED, lambda A, P: A.T @ P @ A, "right-for-scalars-only", ""),
@@ -109,8 +109,6 @@ WRONG = [
     (ENTRY, lambda z: sp.Matrix([[z, 1], [0, 2 * z]]), "some-entries-wrong", "row 2, column 2"),
     # the mistake that spoils least of what is right, and explains most of what is wrong
     (LEAST, lambda a: (a, 2 * a, a**3), "most", ""),
-    # many numbers that agree in the first call that is wrong are no coincidence
-    (squared(np.array([2.0, 2.0, 2.0])), lambda a: 2 * a, "squared", ""),
     (RAMP, lambda a: a * STEPS + (STEPS > 0) * np.cos(a * STEPS), "wrong-from-second-step", ""),
     # what is but rounding is zero
     (of_many(lambda a: a.var()), lambda a: (a - a.mean()).mean(), "is-zero", ""),
@@ -253,36 +251,29 @@ def test_one_thing_changed_in_the_key_is_named(name, old, new):
     assert "The right answer would give that with" in result.message
 
 
-@pytest.mark.filterwarnings("ignore:the matrix subclass")
 def test_other_forms_are_right():
     number = asks(lambda a: a, [(2.0,)])
     for question, answer in (
         (pair(), lambda a, b: np.array([a + b, a * b])),
         (pair(), lambda a, b: sp.Matrix([a + b, a * b])),
         (FORMULAS, lambda z, p: sp.Matrix([c * z, c**2 * p + e**2])),
-        (number, np.matrix),
         (number, complex),
         (asks(lambda a: np.array([0.0, 1.0]), [(1.0,)]), lambda a: np.array([False, True])),
-        (asks(lambda a: np.array([0.0, a]), [(2.0,)]), lambda a: np.matrix([0.0, a])),
     ):
         assert outcome(question, answer).passed
     assert outcome(number, lambda a: np.array([[a]])).status == "unusable"
-    assert like(np.matrix([[1.0]]), z) == 1
-    for value, right, words in (
-        (np.matrix([1.0, 2.0]), np.zeros((2, 1)), "shape"),
-        (np.array([1j]), np.zeros(1), "complex"),
-    ):
-        with pytest.raises(Unusable, match=words):
-            like(value, right)
+    with pytest.raises(Unusable, match="complex"):
+        like(np.array([1j]), np.zeros(1))
 
 
-def test_an_answer_that_ends_the_program_for_other_arguments_does_not_end_the_check():
+def test_what_an_answer_does_with_other_arguments_neither_ends_the_check_nor_shows(recwarn):
     def touchy(y, gain):
         if gain != 0.4:  # the search for hints changes the arguments a little
+            warnings.warn("nearly singular", stacklevel=1)
             raise SystemExit
         return gain * y + y[::-1]
 
-    assert outcome(FILTERED, touchy).status == "wrong"
+    assert outcome(FILTERED, touchy).status == "wrong" and not recwarn.list
 
 
 def test_what_is_not_finite_does_not_reach_lapack(capfd):

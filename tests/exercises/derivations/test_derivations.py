@@ -125,7 +125,6 @@ def kind_and_term(verdict):
         ("d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "lost-factor", "d"),
         ("g^2*d + f^2*(m^4 + 3*d^2)", "lost", "g^2*d + f^2*(m^4 + 3*d^2)"),
         ("g^2*m + f^2*(m^4 + 6*m^2*d + 3*d^2)", "letter", "g^2*m"),
-        ("g^2*d + g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", "doubled", "g^2*d"),
         ("g^2*d + f^2*3*d^2", "moment", "f^2*3*d^2"),
         ("g^2*d + f^2*(m^2 + d)^2", "moment", "f^2*(m^2 + d)^2"),
         # no one term has it
@@ -157,6 +156,20 @@ def test_of_a_first_line_the_definition_is_the_hint_and_nothing_of_the_key_is_sh
 
 
 @pytest.mark.parametrize(
+    ("line", "kind", "term"),
+    [
+        ("u*p + q + u*z^2", "lost-factor", "1 - u"),
+        ("p + (1 - u)*q + u*z^2", "lost-factor", "p"),
+        ("u*p + (1 - u)*q", "lost", "u*p + (1 - u)*q"),
+    ],
+)
+def test_what_a_bracket_is_multiplied_by_is_lost_from_a_term(line, kind, term):
+    """And no other term in it put in question: p1 does not stand above as it is."""
+    verdict = verdict_of(f"W = u*(p + z^2) + (1 - u)*q\n = {line}")
+    assert kind_and_term(verdict) == (kind, term)
+
+
+@pytest.mark.parametrize(
     ("line", "says"),
     [
         ("exp(d/2)*sin(m)", "a sign in `exp(d/2)`"),
@@ -172,7 +185,6 @@ def test_the_mean_of_a_sine(line, says):
     ("first", "line"),
     [
         ("M[x^3]", "M[x^2]*M[x]"),
-        ("g^2*d + f^2*M[x^4]", "g^2*d + f^2*M[x]*M[x^3]"),
         ("M[x*sin(x)]", "m*M[sin(x)]"),
         ("M[sin(x)^2]", "M[sin(x)]^2"),
     ],
@@ -229,15 +241,12 @@ def test_positive_is_declared_and_not_guessed():
     ("line", "says"),
     [
         ("g^2*q", "column 9: unknown letter 'q'"),
-        ("g^2*(d + ", "cannot be read"),
         ("2g", "a product needs *"),
         ("g^2·d", "column 8: · (middle dot) has no meaning"),
         ("__import__('os').system('true')", "a function that is not known here"),
-        ("g.real", "has no meaning here"),
         ("g^g", "an exponent must be a plain number"),
         ("g^999", "the exponent is larger than 16"),
         ("(" * 250 + "g" + ")" * 250, "nested"),
-        ("-" * 1900 + "g", "deep"),
         ("g+" * 900 + "g", "more than 600"),
         ("M[g, d]", "takes one expression"),
     ],

@@ -515,7 +515,6 @@ UNREAD = {
     "A/g.json": "no notebook, but perhaps made from one",
     "linked": "a link, which is not followed",
     ".C/b.IPYNB": "hidden by the dot",
-    "B/.ipynb_checkpoints/lost-checkpoint.ipynb": "hidden by the dot",
     "Петров.ZIP": "an archive: unpack it",
 }
 COPIES = (

@@ -361,9 +361,8 @@ def test_a_killed_worker_is_told():
         ("exercises", "name the variants: --variant 53, or --all"),
         ("exercises --variant 99", "no variant '99'; there are 53, 1,"),
         ("solutions --variant 53 --sets b,zz", "no exercise set zz; there are a, b"),
-        ("solutions --variant 53 --sets ,", "no exercise set"),
         ("exercises --variant 53 --variants no.toml", "no.toml cannot be read"),
-        ("exercises --students no.csv", "no course list no.csv"),
+        ("exercises --students no.csv", "the course list no.csv, a CSV file"),
         ("exercises --students no.csv --nbgrader", "the same notebooks to all students"),
         # two notebooks never share a file
         ("exercises --students same.csv --sets b", "line 3: the folder of Иванов И, 1"),
@@ -438,10 +437,9 @@ def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
     [
         ("", "the first line must name the columns name and group, got nothing"),
         ("student,group\nA,1\n", "got student, group"),
-        ("A,1\nB,1\n", "got a, 1"),
         ("name,group\n", "names no student"),
         ("name,group\nA,1\n,1\n", "line 3: a student without a name"),
-        ("name,group\nA,1\nB,1\nA,1\n", "line 4: A, 1 stands there twice"),
+        ("name,group\nA,1\nB,1\nA,1\n", "line 4: the folder of A, 1 would be 1/A, as that of A"),
         (
             "name,group\nA,1\na,1\n",
             "line 3: the folder of a, 1 would be 1/a, as that of A, 1 in line 2",
@@ -454,16 +452,10 @@ def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
             'name,group\n"A,1\nB,1\n',
             "line 2: unexpected end of data; is a quote opened and not closed?",
         ),
-        ('name,group\n"A,1\nB",1\nC,1\n', "line 2: a quote is opened and not closed on the line"),
-        ('name,group\nA,1\n"B" b,1\n', "line 3: ',' expected after '\"'; is a quote"),
         ("name,group\nA\nB,1\n", "line 2: A without a group"),
         ("name,group\nA,...\n", "line 2: A without a group (got '...')"),
-        ("name,group\nA,1\n?!,1\n", "line 3: a student without a name (got '?!')"),
         ("name,group\nIvanov, Ivan,1\n", "line 2: more values than columns"),
         ("name,group\nA" + "a" * 200_000 + ",1\n", "line 2: field larger than field limit"),
-        ("name,group\nA\x1b[31m,1\n", "line 2: a name with characters that cannot be seen"),
-        ("name,group\nA\u202eB,1\n", "line 2: a name with characters that cannot be seen"),
-        ("name,group\nA\u200bB,1\n", "line 2: a name with characters that cannot be seen"),
     ],
 )
 def test_bad_lists_are_explained(tmp_path, text, message):
