@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 
@@ -517,11 +518,14 @@ def _below(name: str) -> Path:
 def _check_places(folder: Path, json_file: Path | None) -> None:
     """ClickException if the report or the numbers cannot be written where they should."""
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not (there.is_dir() and os.access(there, os.W_OK)):
+    try:  # permissions do not tell: of /proc, or of a disk that is only read
+        with TemporaryDirectory(dir=there):
+            pass
+    except OSError:
         raise click.ClickException(
             f"the report cannot go to {folder}: {there} is no folder to write to; choose another "
             f"one with --out"
-        )
+        ) from None
     if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
         raise click.ClickException(
             f"the numbers cannot go to {json_file}: name a file in an existing folder with --json"

@@ -105,7 +105,7 @@ def save_figure(draw: Callable[[Axes], object], folder: Path, name: str) -> None
     with matplotlib.rc_context({"svg.hashsalt": name}):  # else its marks have random names
         for kind, metadata in _UNDATED.items():
             figure.savefig(folder / f"{name}.{kind}", format=kind, metadata=metadata)
-            figure.set_layout_engine("none")  # has been laid out
+            figure.set_layout_engine(None)  # has been laid out
 
 
 def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any]) -> None:

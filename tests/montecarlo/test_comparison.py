@@ -14,7 +14,7 @@ from kfcourse import Comparison, Ensemble, Gaussian, Model, compare, gaussian, l
 from kfcourse.filters import aof, duof, fos, kalman_filter, mfos, particle, pointmass
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.ensemble import side_by_side, stratified, weights
-from kfcourse.montecarlo.experiment import batch_sizes
+from kfcourse.montecarlo.experiment import WIDE, batch_sizes
 from kfcourse.montecarlo.statistics import Estimate, claimed, rejected
 
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
@@ -175,6 +175,14 @@ def test_weights_make_up_for_the_wider_law():
         for sample, truth in ((w, 1.0), (w * x[:, 0], 1.0), (w * (x[:, 0] - 1) ** 2, 4.0)):
             oracles.is_mean(truth, sample)
     assert (weights(prior, x, None) == 1).all()
+
+
+def test_wider_states_measure_what_far_ones_carry():
+    """The variance of an estimate of M x^4 is a third of what it is from the prior's own states."""
+    prior, x = Gaussian(np.zeros(1), np.eye(1)), np.linspace(-14, 14, 2001)
+    carried = x**8 * stats.norm.pdf(x)
+    part = (weights(prior, x[:, None], WIDE) * carried).sum() / carried.sum()
+    assert part == pytest.approx(1 / 3, abs=0.05)
 
 
 # ---------------------------------------------------------------- the bound
