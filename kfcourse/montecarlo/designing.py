@@ -59,7 +59,7 @@ def design(
     designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     states = list[State]()
-    with joblib.Parallel(jobs, prefer="threads") as parallel:
+    with joblib.Parallel(jobs, "threading") as parallel:
         for k, instant in enumerate(ensemble if designs else ()):
             if k == 0:
                 check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
