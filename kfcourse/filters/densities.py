@@ -20,7 +20,7 @@ import sympy as sp
 from kfcourse.angles import TURN, Components, difference
 from kfcourse.laws import Array, Gaussian, Measurement, log_density
 from kfcourse.symbolic.choices import decides
-from kfcourse.symbolic.known import Stepwise
+from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
@@ -88,7 +88,7 @@ def likelihood(model: Model) -> LogLikelihood:
         )
 
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
-        mean, cov = law.at(k)(x)
+        mean, cov = law(x, k=k)
         away, missing = difference(y, mean, model.angles.y), np.isnan(y)
         sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
         of_zero = Measurement(np.zeros(model.p), cov, cov, cov)
@@ -142,11 +142,11 @@ def _law(
     return mean, cov
 
 
-def _singular(law: Stepwise, model: Model) -> bool:
+def _singular(law: Compiled, model: Model) -> bool:
     """Whether the covariance is singular at all states tried: the determinant of long formulas
     takes SymPy minutes."""
     with np.errstate(all="ignore"):
-        cov = law.at(0)(_states(model))[1]
+        cov = law(_states(model), k=0)[1]
         deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
         correlation = cov / (deviation[..., :, None] * deviation[..., None, :])
     good = np.isfinite(correlation).all(axis=(-2, -1))

@@ -15,7 +15,7 @@ import sympy as sp
 
 from kfcourse.laws import Array, Matrices, Measurement, Vectors, apply, symmetric
 from kfcourse.symbolic.choices import decides
-from kfcourse.symbolic.known import Stepwise
+from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
@@ -120,9 +120,9 @@ def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, V
     state = _affine(model.difference_equation("a linear system"), model.x, model.v, model)
     meter = _affine(model.meter_equation, model.x, model.w, model)
     if not model.timed:
-        system = _system(model, state.at(None)(), meter.at(None)())
+        system = _system(model, state(), meter())
         return lambda k: system
-    return lambda k: _system(model, state.at(k)(), meter.at(k)())
+    return lambda k: _system(model, state(k=k), meter(k=k))
 
 
 def _system(
@@ -145,7 +145,7 @@ def is_linear(model: Model) -> bool:
 
 def _affine(
     equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model
-) -> Stepwise:
+) -> Compiled:
     """Matrices of equation = A x + B noise + constant, as a function of the step."""
     numeric, variables = equation.subs(model.values), [*x, *noise]
     slopes = numeric.jacobian(sp.Matrix(variables)).applyfunc(sp.expand)

@@ -129,7 +129,7 @@ def _information(
 
     def at(x: Array, k: int) -> tuple[Array, Array, Array]:
         slope, S, *changes = (
-            np.broadcast_to(values, (len(x), *values.shape[-2:])) for values in functions.at(k)(x)
+            np.broadcast_to(values, (len(x), *values.shape[-2:])) for values in functions(x, k=k)
         )
         precision = np.linalg.inv(S)
         mixed = transpose(slope) @ precision

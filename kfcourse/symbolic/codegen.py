@@ -21,11 +21,10 @@ _as_products = create_expand_pow_optimization(MAX_DEGREE)
 
 # A list is a vector's entries.
 Entries: TypeAlias = Sequence[sp.Expr] | sp.MatrixBase | sp.NDimArray
+Compiled: TypeAlias = Callable[..., tuple[Array, ...]]
 
 
-def compile_function(
-    arguments: Sequence[Entries], outputs: Sequence[Entries]
-) -> Callable[..., tuple[Array, ...]]:
+def compile_function(arguments: Sequence[Entries], outputs: Sequence[Entries]) -> Compiled:
     """Compile expressions into one function of arrays.
 
     Parameters
@@ -54,9 +53,7 @@ def compile_function(
 
 # the modes of a model, and models that differ in one noise, share an equation
 @lru_cache(maxsize=256)
-def _compiled(
-    arguments: tuple[sp.NDimArray, ...], outputs: tuple[sp.NDimArray, ...]
-) -> Callable[..., tuple[Array, ...]]:
+def _compiled(arguments: tuple[sp.NDimArray, ...], outputs: tuple[sp.NDimArray, ...]) -> Compiled:
     places = [
         (number, index)
         for number, symbols in enumerate(arguments)

@@ -38,4 +38,4 @@ def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
 
 def _compiled(equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], model: Model) -> Equation:
     function = model.compiled([model.x, noise], [list(equation)])
-    return lambda x, noise, k=None: function.at(k)(x, noise)[0]
+    return lambda x, noise, k=None: function(x, noise, k=k)[0]

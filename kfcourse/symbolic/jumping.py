@@ -11,7 +11,7 @@ code are derived as any model's are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -21,8 +21,9 @@ import sympy as sp
 
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.formula import FormulaError, symbol
-from kfcourse.symbolic.known import Stepwise
+from kfcourse.symbolic.codegen import Compiled
+from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.known import Known
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import (
     Formulas,
@@ -51,13 +52,17 @@ class JumpModel:
         Of one state, measurement and prior, with noises of the same names.
     first : ndarray (J,)
         q, law of the first mode.
+    chain : sympy.Matrix
+        pi, J x J, as formulas.
+    known : Known
+        What the chain knows of every step.
     """
 
     names: tuple[str, ...]
     modes: tuple[Model, ...]
     first: Array = field(compare=False)
     chain: sp.ImmutableMatrix = field(repr=False)
-    chain_of_step: Stepwise = field(repr=False, compare=False)
+    known: Known = field(repr=False, compare=False)
 
     @classmethod
     def define(
@@ -100,34 +105,38 @@ class JumpModel:
         JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x;
         C = 10)
         """
-        tables, common = _tables(modes), table("parameters", parameters)
-        built, changed = [], set[str]()
-        for name, change in tables.items():
+        shared = {"state": state, "meter": meter, **options}
+        common, changed = table("parameters", parameters), set[str]()
+        built: dict[str, Model] = {}
+        for name, change in table("modes", modes).items():
             try:
-                own = table("parameters", change.get("parameters"))
-                given = {"state": state, "meter": meter, **options, **change}
-                built.append(Model.define(**given | {"parameters": {**common, **own}}))
+                own = table(f"modes.{name}", change)
+                if unknown := sorted(set(own) - set(OF_A_MODE)):
+                    raise ModelError(
+                        f"modes may differ in {', '.join(OF_A_MODE)}, not in {', '.join(unknown)}"
+                    )
+                values = table("parameters", own.get("parameters"))
+                given = shared | own | {"parameters": common | values}
+                built[str(name)] = Model.define(**given)
             except (ModelError, FormulaError) as error:
                 raise ModelError(f"mode {name}: {error}") from None
-            changed |= set(own)
-        fitting = _fitting(tuple(tables), built)
-        rows = np.atleast_2d(np.array(transition, dtype=object))
-        size = len(fitting)
+            changed |= set(values)
+        _check_alike(built)
+        size, rows = len(built), np.atleast_2d(np.array(transition, dtype=object))
         if rows.shape not in ((1, size), (size, size)) or any(map(np.ndim, rows.flat)):
             raise ModelError(
                 f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or "
                 f"one row, got {shown(transition)}"
             )
-        matrix, of_step = _compiled(np.broadcast_to(rows, (size, size)), fitting[0], changed)
-        if len(rows) == 1 and first is None and not matrix.has(*fitting[0].x):
-            first = of_step.at(0)(np.zeros(fitting[0].n))[0][0].tolist()
-        law = probabilities("`first`", first, (size,))
-        model = cls(tuple(tables), fitting, law, matrix, of_step)
+        names, fitting = zip(*built.items(), strict=True)
+        chain, known = _chain(np.broadcast_to(rows, (size, size)), fitting[0], changed)
+        model = cls(names, fitting, np.empty(0), chain, known)
         if not model.by_state:
             # a row that is none is refused here; of later steps and of states, where they are
             # reached
-            model.transition_at(0)
-        return model
+            at_start = model.transition_at(0)
+            first = at_start[0] if len(rows) == 1 and first is None else first
+        return replace(model, first=probabilities("`first`", first, (size,)))
 
     @property
     def n(self) -> int:
@@ -157,12 +166,17 @@ class JumpModel:
     @property
     def steps(self) -> float:
         """For how many steps the modes' inputs have values."""
-        return min(self.chain_of_step.known.steps, *(mode.known.steps for mode in self.modes))
+        return min(self.known.steps, *(mode.known.steps for mode in self.modes))
 
     @cached_property
     def by_state(self) -> bool:
         """Whether the probabilities of transitions depend on the state."""
         return self.chain.has(*self.x)
+
+    @cached_property
+    def _rows(self) -> Compiled:
+        """The chain as a function of the state and the step."""
+        return replace(self.modes[0], known=self.known).compiled([self.x], [self.chain])
 
     def without_state(self, what: str) -> None:
         """ModelError, which names what needs them, if the modes' probabilities before any
@@ -178,7 +192,7 @@ class JumpModel:
     def transition_of(self, x: Array, k: int) -> Array:
         """pi at step k and states x (..., n), (..., J, J)."""
         with np.errstate(all="ignore"):
-            rows = self.chain_of_step.at(k)(x)[0]
+            rows = self._rows(x, k=k)[0]
         finite = rows[np.isfinite(x).all(axis=-1)] if self.by_state else rows
         probabilities(f"`transition` at step {k}", finite, finite.shape)
         rows = rows / rows.sum(axis=-1, keepdims=True)
@@ -194,7 +208,7 @@ class JumpModel:
         """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError
         if they are not known."""
         self.without_state("the law of the modes")
-        if not self.chain_of_step.known.symbols:
+        if not self.known.symbols:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
 
@@ -204,58 +218,40 @@ class JumpModel:
         return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in pairs)})"
 
 
-def _tables(modes: Any) -> dict[str, dict[str, Any]]:
-    tables = {
-        str(name): table(f"modes.{name}", change) for name, change in table("modes", modes).items()
-    }
-    if not tables:
+def _check_alike(modes: Mapping[str, Model]) -> None:
+    """ModelError unless there are modes, of one state, measurement and noises."""
+    if not modes:
         raise ModelError("`modes` has no mode; give them by name: {sound = {}, faulty = {...}}")
-    for name, change in tables.items():
-        if unknown := sorted(set(change) - set(OF_A_MODE)):
+    (first, expected), *others = (
+        (name, (mode.x, mode.angles, mode.p, len(mode.v), len(mode.w)))
+        for name, mode in modes.items()
+    )
+    for name, form in others:
+        if form != expected:
             raise ModelError(
-                f"mode {name}: modes may differ in {', '.join(OF_A_MODE)}, not in "
-                f"{', '.join(unknown)}"
-            )
-    return tables
-
-
-def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...]:
-    """The modes, if they are of one state, measurement and noises; ModelError if not."""
-
-    def form(mode: Model) -> tuple[Any, ...]:
-        return mode.x, mode.angles, mode.p, len(mode.v), len(mode.w)
-
-    for name, mode in zip(names, modes, strict=True):
-        if form(mode) != form(modes[0]):
-            raise ModelError(
-                f"modes {names[0]} and {name} differ in their state's symbols or angles, or in the "
+                f"modes {first} and {name} differ in their state's symbols or angles, or in the "
                 "number of measurement components or noises; name noises by `symbols`, such as "
                 'v = ["v1", "v2"]'
             )
-    return tuple(modes)
 
 
-def _compiled(rows: Array, model: Model, changed: set[str]) -> tuple[sp.ImmutableMatrix, Stepwise]:
-    """The chain as formulas, and as a function of the state at each step."""
-    taken = by_name(model.x, model.v, model.w)
-    of_step = model.known.names([*model.parameters, *changed, *taken])
+def _chain(rows: Array, model: Model, changed: Collection[str]) -> tuple[sp.ImmutableMatrix, Known]:
+    """The chain as formulas, and what it knows of every step."""
+    of_step = model.known.names([*model.parameters, *changed, *by_name(model.x, model.v, model.w)])
     # what differs between the modes is not known
-    names = {name: symbol(name) for name in model.parameters if name not in changed}
-    names |= of_step | by_name(model.x)
+    shared = [s for s in model.values if s.name not in changed]
+    names = of_step | by_name(model.x, shared)
     try:
-        matrix = sp.ImmutableMatrix(
-            *rows.shape,
-            [
-                read(p, names, "transition")
-                if isinstance(p, str | sp.Expr)
-                else exact_number("an entry", p)
-                for p in rows.flat
-            ],
-        )
+        entries = [
+            read(p, names, "transition")
+            if isinstance(p, str | sp.Expr)
+            else exact_number("an entry", p)
+            for p in rows.flat
+        ]
     except (ModelError, FormulaError) as error:
         raise ModelError(f"`transition`: {error}") from None
-    model = replace(model, known=model.known.used(matrix, of_step))
-    return matrix, model.compiled([model.x], [matrix])
+    matrix = sp.ImmutableMatrix(*rows.shape, entries)
+    return matrix, model.known.used(matrix, of_step)
 
 
 def probabilities(what: str, given: Any, shape: tuple[int, ...]) -> Array:

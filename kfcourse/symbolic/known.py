@@ -1,15 +1,12 @@
 """What is known of every step: its number k, its time t = interval * k, and the inputs; and
-functions that depend on it.
-
-A model without them pays nothing: a `Stepwise` function is then the generated function itself, at
-every step.
+variances of noises that depend on it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -78,21 +75,34 @@ class Known:
         ends = (len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols)
         return min([np.inf, *ends])
 
-    def at(self, k: int) -> Array:
-        """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
+    def at(self, k: int | None) -> Array:
+        """Values of `symbols` at step k, (m,).
+
+        Raises
+        ------
+        ModelError
+            There are any, and no step is given, or an input ends before.
+        """
+        if not self.symbols:
+            return np.empty(0)
+        if k is None:
+            raise ModelError(
+                "the model depends on the step: say which, as in structure.at(k) or "
+                "equation(x, v, k)"
+            )
         return np.array([self._value(s.name, k) for s in self.symbols])
 
     def _value(self, name: str, k: int) -> float:
-        if name in self.inputs:
-            values = self.inputs[name]
-            if k >= len(values):
-                raise ModelError(
-                    f"the input {name} has {len(values)} value(s), for the steps 0 to "
-                    f"{len(values) - 1}, but step {k} needs one; "
-                    "give a value for every step, or run fewer"
-                )
-            return values[k]
-        return float(k if name == "k" else self.interval * k)
+        if name not in self.inputs:
+            return float(k if name == "k" else self.interval * k)
+        values = self.inputs[name]
+        if k >= len(values):
+            raise ModelError(
+                f"the input {name} has {len(values)} value(s), for the steps 0 to "
+                f"{len(values) - 1}, but step {k} needs one; "
+                "give a value for every step, or run fewer"
+            )
+        return values[k]
 
     def latex(self, time: str = "t") -> list[str]:
         """Lines of an `aligned` block: the time of a step, and the first values of the inputs."""
@@ -113,26 +123,6 @@ def _sequence(name: str, given: Any) -> tuple[float, ...]:
             f"{shown(given)}"
         )
     return tuple(values.tolist())
-
-
-class Stepwise(NamedTuple):
-    """A generated function, and what is known of every step: the function's last argument, if its
-    formulas contain any of it."""
-
-    function: Callable[..., tuple[Array, ...]]
-    known: Known
-
-    def at(self, k: int | None) -> Callable[..., Any]:
-        """The function at step k."""
-        if not self.known.symbols:
-            return self.function
-        if k is None:
-            raise ModelError(
-                "the model depends on the step: say which, as in structure.at(k) or "
-                "equation(x, v, k)"
-            )
-        values = self.known.at(k)
-        return lambda *arrays: self.function(*arrays, values)
 
 
 def varying_law(

@@ -24,9 +24,9 @@ import sympy as sp
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees
-from kfcourse.symbolic.codegen import Entries, check_numbers, compile_function
+from kfcourse.symbolic.codegen import Compiled, Entries, check_numbers, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
-from kfcourse.symbolic.known import Known, Stepwise, varying_law
+from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -244,12 +244,12 @@ class Model:
         """Names of the measurement's components: y, or y1, y2, ..."""
         return numbered("y", self.p)
 
-    def compiled(self, arguments: Sequence[Entries], outputs: Sequence[Entries]) -> Stepwise:
-        """A function of arrays for each step, as of `compile_function`, with the parameters'
-        values."""
+    def compiled(self, arguments: Sequence[Entries], outputs: Sequence[Entries]) -> Compiled:
+        """A function of arrays and of the step, `function(*arrays, k=k)`, as of `compile_function`,
+        with the parameters' values; the step matters only where the model depends on it."""
         numeric = [sp.Array(entries).subs(self.values) for entries in outputs]
-        known = [self.known.symbols] if self.timed else []
-        return Stepwise(compile_function([*arguments, *known], numeric), self.known)
+        function = compile_function([*arguments, self.known.symbols], numeric)
+        return lambda *arrays, k=None: function(*arrays, self.known.at(k))
 
     def replace(self, **parameters: float) -> Model:
         """The same model with some parameters changed: ``model.replace(f=0.2)``; ModelError where

@@ -32,8 +32,8 @@ from kfcourse.laws import (
     transpose,
 )
 from kfcourse.symbolic.choices import decides
+from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 from kfcourse.symbolic.structure import Structure, of_steps
@@ -122,7 +122,7 @@ def gauss_hermite(model: Model, order: int = 5) -> Structure:
 def axes(model: Model) -> int:
     """Over how many variables the Gauss-Hermite rule spreads: the state, and the noises of an
     equation that need points."""
-    return max(side.axes for side in _sides(model))
+    return max(side.points.shape[1] for side in _sides(model, partial(product_rule, 1)))
 
 
 def product_rule(order: int, size: int) -> tuple[Array, Array]:
@@ -139,27 +139,21 @@ def product_rule(order: int, size: int) -> tuple[Array, Array]:
 
 class _Side(NamedTuple):
     """An equation of the model as f(x, noises, k), what noises without points add to the
-    covariance, and a rule's points, standard normal, with their weights."""
+    covariance, and the points (q, s), standard normal, with their weights (q,)."""
 
     model: Model
     function: Callable[..., Array]
     mean: Array  # of all noises
     root: Array  # of the covariance of the noises with points, columns for them only
-    factors: Stepwise  # B D B^T of those without points
+    factors: Compiled  # B D B^T of those without points
     angles: Components  # components of the function's value
-    size: int
-    points: Array = np.empty((0, 0))
-    weights: Array = np.empty(0)
-
-    @property
-    def axes(self) -> int:
-        """How many variables have points: the state, and noises."""
-        return self.model.n + self.root.shape[1]
+    points: Array
+    weights: Array
 
     def added(self, x: Array, k: int | None) -> Array:
         """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given
         x."""
-        covs = self.factors.at(k)(x)[0]
+        covs = self.factors(x, k=k)[0]
         if covs.ndim > 2:
             covs = np.einsum("q,...qij->...ij", self.weights, covs)
         return symmetric(covs)
@@ -173,9 +167,7 @@ class _Side(NamedTuple):
         dx = np.where(known[..., None, :], 0.0, self.points[:, :n]) @ transpose(root)
         _warn_of_turns(self.model, dx)
         x = mean[..., None, :] + dx
-        noise = self.mean + self.points[:, n:] @ self.root.T
-        values = self.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]), k)
-        values = np.broadcast_to(values, (*x.shape[:-1], self.size))
+        values = self.function(x, self.mean + self.points[:, n:] @ self.root.T, k)
         middle = values[..., np.argmin((self.points**2).sum(axis=1)), :]
         off = difference(values, middle[..., None, :], self.angles)
         shift = self.weights @ off
@@ -204,24 +196,26 @@ class _Side(NamedTuple):
         return value, slopes, self.spread(rest) + added
 
 
-def _sides(model: Model, with_factors: bool = False) -> tuple[_Side, _Side]:
+def _sides(model: Model, rule: Rule, with_factors: bool = False) -> tuple[_Side, _Side]:
     """Object and meter, with points for the noises that do not enter linearly, or for those
-    `with_factors` of the state, too."""
+    `with_factors` of the state, too: `rule` makes them."""
     state, meter = compile_model(model)
+    of_rule = partial(_side, model, rule, with_factors)
     return (
-        _side(
-            model, with_factors, state, model.state_equation, model.v, model.state_noise,
-            model.angles.x,
-        ),
-        _side(
-            model, with_factors, meter, model.meter_equation, model.w, model.meter_noise,
-            model.angles.y,
-        ),
-    )  # fmt: skip
+        of_rule(state, model.state_equation, model.v, model.state_noise, model.angles.x),
+        of_rule(meter, model.meter_equation, model.w, model.meter_noise, model.angles.y),
+    )
 
 
 def _side(
-    model: Model, with_factors: bool, function, equation, noises, law: Gaussian, angles: Components
+    model: Model,
+    rule: Rule,
+    with_factors: bool,
+    function: Callable[..., Array],
+    equation: sp.MatrixBase,
+    noises: Sequence[sp.Symbol],
+    law: Gaussian,
+    angles: Components,
 ) -> _Side:
     factors = equation.subs(model.values).jacobian(list(noises))
     varying = (*model.x, *noises) if with_factors else noises
@@ -232,9 +226,11 @@ def _side(
     for _ in noises:  # and what is correlated with one of them
         pointed |= (law.cov[:, pointed] != 0).any(axis=1)
     cov = exact_matrix(np.where(pointed[:, None] | pointed, 0.0, law.cov))
-    stepwise = model.compiled([model.x], [factors * cov * factors.T])
+    covariance = model.compiled([model.x], [factors * cov * factors.T])
     root = np.eye(len(noises))[:, pointed] @ square_root(law.cov[np.ix_(pointed, pointed)])
-    return _Side(model, function, law.mean, root, stepwise, angles, len(equation))
+    return _Side(
+        model, function, law.mean, root, covariance, angles, *rule(model.n + root.shape[1])
+    )
 
 
 def _checked(
@@ -250,32 +246,34 @@ def _checked(
     expect(model, Model, name)
     if model.between is not None:
         return model.between.structure(model, build)
-    sides = _sides(model, with_factors)
-    structure, problem = _by_points(name, model, rule, sides), ""
+    by_rule = partial(_by_points, name, model, with_factors)
+    structure = by_rule(rule)
     with np.errstate(all="ignore"):
         if not all(np.isfinite(part).all() for law in _at_prior(structure) for part in law):
-            problem = f"{name}: a function of {model} is not finite at the points of the prior law"
-        elif (2 * order) ** max(side.axes for side in sides) <= MOST_POINTS:
-            problem = _disagreement(model, name, order, sides)
-    if problem:
-        _warn(problem)
+            _warn(f"{name}: a function of {model} is not finite at the points of the prior law")
+        elif problem := _disagreement(by_rule, order):
+            _warn(f"{name}: {problem}")
     return structure
 
 
-def _disagreement(model: Model, name: str, order: int, sides: Sequence[_Side]) -> str:
+def _disagreement(by_rule: Callable[[Rule], Structure], order: int) -> str:
     """What Gauss-Hermite rules of this order and of twice the order say otherwise at the prior law;
-    empty if nothing."""
+    empty if nothing, or if they take too many points."""
+    rules = (partial(product_rule, points) for points in (order, 2 * order))
     with warnings.catch_warnings():
         # these points are not those that the filter uses
         warnings.simplefilter("ignore", QuadratureWarning)
-        rules = (partial(product_rule, points) for points in (order, 2 * order))
-        coarse, fine = (_at_prior(_by_points(name, model, rule, sides)) for rule in rules)
+        try:
+            structure, finer = map(by_rule, rules)
+        except ModelError:
+            return ""
+        model, coarse, fine = structure.model, _at_prior(structure), _at_prior(finer)
     parts = zip(("next state", "measurement"), coarse, fine, model.angles, strict=True)
     for what, less, more, angles in parts:
         for moment, error in zip(("mean", "covariance"), apart(less, more, angles), strict=True):
             if not (largest := np.abs(error).max()) <= CONVERGED:
                 return (
-                    f"{name}: with {2 * order} points an axis in place of {order} the {moment} of "
+                    f"with {2 * order} points an axis in place of {order} the {moment} of "
                     f"the {what} of {model} at the prior law changes by {100 * largest:.2g} %: it "
                     "may be infinite, or the function too rough for these points"
                 )
@@ -334,14 +332,11 @@ def _lower_root(cov: Array) -> tuple[Array, Array]:
     return root, known
 
 
-def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> Structure:
+def _by_points(name: str, model: Model, with_factors: bool, rule: Rule) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights
     (q,))."""
-    rules = [rule(side.axes) for side in sides]
-    state, meter = (
-        side._replace(points=x, weights=w) for side, (x, w) in zip(sides, rules, strict=True)
-    )
-    n, measurement = model.n, measurement_of(model.angles.y)
+    state, meter = _sides(model, rule, with_factors)
+    measurement = measurement_of(model.angles.y)
 
     def at(k: int | None) -> Structure:
         def predict(z: Array, p: Array) -> Gaussian:
@@ -349,12 +344,10 @@ def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> S
             return Gaussian(tau, state.spread(deviation) + added)
 
         def measure(m: Array, d: Array) -> Measurement:
-            d = np.broadcast_to(d, (*m.shape, n))
             h, G, R = meter.regressed(m, d, k)
             return measurement(h, G, symmetric(G @ d @ transpose(G)) + R, R)
 
         def transition(z: Array, p: Array) -> Transition:
-            p = np.broadcast_to(p, (*z.shape, n))
             return Transition(*state.regressed(z, p, k)[1:])
 
         return Structure(name, model, predict, measure, transition)

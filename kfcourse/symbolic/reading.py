@@ -22,7 +22,7 @@ Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
 Names: TypeAlias = Sequence[str]
 
 
-def by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:
+def by_name(*groups: Sequence[sp.Symbol]) -> dict[str, sp.Symbol]:
     """Symbols by their names."""
     return {s.name: s for group in groups for s in group}
 

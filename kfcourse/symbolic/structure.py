@@ -33,7 +33,7 @@ from kfcourse.laws import (
     Vectors,
     measurement_of,
 )
-from kfcourse.symbolic.known import Stepwise
+from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.sides import Side, moments, plain, taylor
 from kfcourse.symbolic.typesetting import aligned
@@ -185,19 +185,19 @@ class StructuralFormulas:
         return _expanded(self.unexplained[0])
 
     @cached_property
-    def compiled_predict(self) -> Stepwise:
+    def compiled_predict(self) -> Compiled:
         tau, Theta = self.functions["tau"], self.functions["Theta"]
         return self.model.compiled([list(self.z), self.p], [list(tau), Theta])
 
     @cached_property
-    def compiled_measure(self) -> Stepwise:
+    def compiled_measure(self) -> Compiled:
         """h, G, R, and G d G^T: F is their sum."""
         h, G = self.functions["h"], self.functions["G"]
         outputs = [list(h), G, self.R, G * self.d * G.T]
         return self.model.compiled([list(self.m), self.d], outputs)
 
     @cached_property
-    def compiled_transition(self) -> Stepwise:
+    def compiled_transition(self) -> Compiled:
         return self.model.compiled([list(self.z), self.p], [self.A, self.Q])
 
     def structure(self) -> Structure:
@@ -205,15 +205,15 @@ class StructuralFormulas:
         return of_steps(self.name, self.model, self._at, self)
 
     def _at(self, k: int | None) -> Structure:
-        predict, measure = self.compiled_predict.at(k), self.compiled_measure.at(k)
+        predict, measure = self.compiled_predict, self.compiled_measure
         angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
 
         def predicted(z: Vectors, p: Matrices) -> Gaussian:
-            tau, Theta = predict(z, p)
+            tau, Theta = predict(z, p, k=k)
             return Gaussian(on_circle(tau, angles.x), Theta)
 
         def measured(m: Vectors, d: Matrices) -> Measurement:
-            h, G, R, explained = measure(m, d)
+            h, G, R, explained = measure(m, d, k=k)
             return measurement(h, G, explained + R, R)
 
         return Structure(
@@ -222,7 +222,7 @@ class StructuralFormulas:
             predicted,
             measured,
             # compiled where it is asked for
-            lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),
+            lambda z, p: Transition(*self.compiled_transition(z, p, k=k)),
             self,
         )
 

@@ -68,7 +68,7 @@ def linearisation(model: Model) -> Functions:
         shape = np.shape(formula)
 
         def of_arrays(at: Array, k: int | None = None) -> Array:
-            return np.array(np.broadcast_to(function.at(k)(at)[0], (*np.shape(at)[:-1], *shape)))
+            return np.array(np.broadcast_to(function(at, k=k)[0], (*np.shape(at)[:-1], *shape)))
 
         return of_steps(lambda at, k: of_arrays(at, k)) if model.timed else lambda at: of_arrays(at)
 

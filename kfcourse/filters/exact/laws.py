@@ -61,7 +61,7 @@ def constants(model: Model | JumpModel, k: int) -> Array:
     parts = [[mean, max(np.sqrt(variance), SHARPEST * max(abs(mean), 1.0))]]
     parts += [[*map(float, mode.values.values()), *mode.known.at(k)] for mode in modes_of(model)]
     if isinstance(model, JumpModel):
-        parts.append([*model.chain_of_step.known.at(k)])
+        parts.append([*model.known.at(k)])
     return np.array([value for part in parts for value in part])
 
 
@@ -82,7 +82,7 @@ def printed(model: Model | JumpModel) -> str:
         )
         cases += [(2 * j, [mean, deviation]), (2 * j + 1, [meter, meter_deviation])]
     if isinstance(model, JumpModel) and model.by_state:
-        own = of_modes[0] | names(model.chain_of_step.known.symbols)
+        own = of_modes[0] | names(model.known.symbols)
         cases += [(-1 - i, [entry.xreplace(own), sp.S.Zero]) for i, entry in enumerate(model.chain)]
     return HEADER + "".join(_case(which, outputs) for which, outputs in cases)
 
