@@ -19,7 +19,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import joblib
 import numpy as np
@@ -29,7 +29,7 @@ from kfcourse.errors import NoClosedForm, NotFinite
 from kfcourse.lab.admission import admissions, aligned
 from kfcourse.lab.short_names import LAB, Structures, operations, title
 from kfcourse.lab.variants import RUNS, Variant
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo import FEWEST
@@ -140,9 +140,7 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     moments = bounded(x)
     if moments.ok:
         laws = {name: getattr(model, name) for name in ("prior", "state_noise", "meter_noise")}
-        larger: dict[str, Any] = {
-            name: Gaussian(law.mean, STRESS**2 * law.cov) for name, law in laws.items()
-        }
+        larger = {name: law._replace(cov=STRESS**2 * law.cov) for name, law in laws.items()}
         far = simulate(dataclasses.replace(model, **larger), runs, steps, seed).x
         if not np.isfinite(far).all():
             rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"
@@ -151,11 +149,11 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
         return {"bounded": moments}
     try:
         result = compare(filters, model, runs, steps, seed, jobs=1, progress=False)
-        failures = [str(reason) for reason in result.left_out.values()]
+        failure = next(iter(result.left_out.values()), "")
     except NotFinite as error:
-        failures = [str(error)]
-    if failures:
-        return {"bounded": Finding(False, failures[0], moments.value)}
+        failure = error
+    if failure:
+        return {"bounded": Finding(False, str(failure), moments.value)}
     return {
         "bounded": not_diverging(result, x) or moments,
         "observable": observable(result, x),

@@ -405,15 +405,12 @@ class StudentReport:
         """What a reader must know before he relies on distances from the bound."""
         result = self.result
         steps = {"rounding": result.without_error, "doubtful": result.doubtful}
-        if result.lost:
-            steps["diverged"] = np.any([*result.lost.values()], axis=0)
+        steps["diverged"] = np.any([*result.lost.values()], axis=0)
+        names = ", ".join(map(self.title, result.lost))
         for kind, mask in steps.items():
             if mask.any():
-                whose, at = (
-                    ", ".join(map(self.title, result.lost)),
-                    self.at(np.flatnonzero(mask).tolist()),
-                )
-                yield self.phrase(f"remark_{kind}", names=whose, at=at)
+                at = self.at(np.flatnonzero(mask).tolist())
+                yield self.phrase(f"remark_{kind}", names=names, at=at)
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""

@@ -13,7 +13,7 @@ from kfcourse.filters import aof, duof, gpb2, imm, kalman_filter, particle, poin
 from kfcourse.lab import find_variant
 from kfcourse.montecarlo.ensemble import side_by_side
 from kfcourse.montecarlo.experiment import batch_sizes, states
-from kfcourse.montecarlo.scores import DRAWS, crps, crps_of_draws, scored
+from kfcourse.montecarlo.scores import crps, scored
 
 pytestmark = pytest.mark.quick
 
@@ -53,15 +53,6 @@ def test_crps_of_points():
     point = crps(np.array([[0.0, 1.0]]), np.zeros((1, 2)), np.array([[0.5, 0.5]]))
     # P steps by a half at y and one below it: (1/2)^2 over a length of 1
     assert_allclose(point, 0.25, rtol=1e-15)
-
-
-def test_what_is_drawn_widens_an_interval_by_a_tenth():
-    """Of a normal law, beside its closed form; half as many draws would by 18 %."""
-    rng = np.random.default_rng(1)
-    y = rng.standard_normal((50_000, 1))
-    sure = crps(y, np.ones_like(y), np.ones_like(y))
-    drawn = crps_of_draws(y, rng.standard_normal((DRAWS, *y.shape)), ())
-    assert drawn.std() / sure.std() == pytest.approx(1.1, abs=0.02)
 
 
 def test_a_slow_loop():
@@ -136,7 +127,8 @@ def test_what_is_drawn_from_a_prediction_has_its_crps(model, build):
     compared = compare(filters, model, 1000, 4, seed=3, scores=gaussian(model))
     apart = compared.crps(filters[0].name, minus=normal.name)
     assert (np.abs(apart.value) < 4 * apart.standard_error).all()
-    assert (apart.standard_error < 0.03 * compared.crps(normal.name).value).all()
+    # with 16 draws 0.0103; half as many have 0.0135
+    assert (apart.standard_error / compared.crps(normal.name).value).mean() < 0.0117
 
 
 def test_where_the_density_is_nothing_at_a_point():
