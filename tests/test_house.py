@@ -206,14 +206,14 @@ ROOMS = {
     "kfcourse/*.py": 6_150,
     "kfcourse/continuous": 9_840,
     "kfcourse/filters": 30_480,
-    "kfcourse/lab": 18_840,
+    "kfcourse/lab": 18_770,
     "kfcourse/linear": 5_550,
-    "kfcourse/montecarlo": 10_560,
+    "kfcourse/montecarlo": 10_510,
     "kfcourse/pages": 8_040,
     "kfcourse/records": 5_540,
     "kfcourse/scenarios": 9_990,
     "kfcourse/symbolic": 20_480,
-    "tests": 172_120,
+    "tests": 171_970,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,
