@@ -14,8 +14,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
+from joblib import cpu_count
 
 from kfcourse.errors import NotFinite
 from kfcourse.exercises.checks.posing import unposed
@@ -44,11 +46,10 @@ from kfcourse.lab.short_names import (
     title,
 )
 from kfcourse.lab.variants import RUNS as CHECKED
-from kfcourse.lab.variants import STEPS, find_variant, read_tables, read_variants, summary
+from kfcourse.lab.variants import STEPS, find_variant, read_variants, summary
 from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.parallel import cores
 from kfcourse.symbolic.model import Model
 
 # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
@@ -71,7 +72,7 @@ SEED = click.option(
 JOBS = click.option(
     "--jobs",
     type=click.IntRange(min=1),
-    default=cores,
+    default=cpu_count,
     show_default="all",
     help="Processor cores to use; does not change the numbers.",
 )
@@ -164,7 +165,6 @@ def main() -> None:
     "thousand trajectories.",
 )
 @JOBS
-@click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
 @click.option("--out", type=PATH, help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report",
@@ -194,7 +194,6 @@ def lab(
     names: str | None,
     bound: bool,
     jobs: int,
-    dask: str | None,
     out: Path | None,
     language: str,
     scores: bool,
@@ -234,10 +233,8 @@ def lab(
     folder = out or _below(f"lab-{chosen.name}")
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = compare(
-        filters, model, runs, steps or chosen.steps, seed, jobs=jobs,
-        dask=dask, scores=judging(model) if scores else None,
-    )  # fmt: skip
+    judge = judging(model) if scores else None
+    result = compare(filters, model, runs, steps or chosen.steps, seed, jobs=jobs, scores=judge)
     result = replace(result, left_out={**refused, **result.left_out})
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -339,11 +336,6 @@ def variants(
     if wanted is not None:
         _generate(wanted, seed, runs, jobs, out)
         return
-    if not check and variants_file is None:  # that the shipped ones are models was tested
-        tables = read_tables(names=names)
-        click.echo("\n".join(summary(name, table) for name, table in tables.items()))
-        return
-
     chosen, faults = read_variants(variants_file, names)
     good = not faults
     if check and chosen:
@@ -517,11 +509,14 @@ def _below(name: str) -> Path:
 def _check_places(folder: Path, json_file: Path | None) -> None:
     """ClickException if the report or the numbers cannot be written where they should."""
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not (there.is_dir() and os.access(there, os.W_OK)):
+    try:  # permissions do not tell: of /proc, or of a disk that is only read
+        with TemporaryDirectory(dir=there):
+            pass
+    except OSError:
         raise click.ClickException(
             f"the report cannot go to {folder}: {there} is no folder to write to; choose another "
             f"one with --out"
-        )
+        ) from None
     if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
         raise click.ClickException(
             f"the numbers cannot go to {json_file}: name a file in an existing folder with --json"

@@ -237,7 +237,10 @@ def test_what_is_no_derivation_is_said_in_a_sentence(call, tmp_path, content, op
                 (".", ["cannot be read: Is a directory"]),
             )
         ),
-        *((f"lab 53 --out {out}", [out, "--out"]) for out in ("mine.toml", "mine.toml/below")),
+        *(
+            (f"lab 53 --out {out}", [out, "--out"])
+            for out in ("mine.toml", "mine.toml/below", "/proc/below")
+        ),
         *(
             (f"lab 53 --json {path}", [path, "--json"])
             for path in (".", "no/such/folder/n.json", "mine.toml/n.json")

@@ -196,30 +196,13 @@ def columns_of(result: Analysis) -> dict[str, Array]:
 def write_record(result: Analysis, folder: Path) -> None:
     """Write estimate.csv, report.html and the figures, all of them or none."""
     model, times, columns = result.record.model, result.record.times, columns_of(result)
-    pictures: dict[str, tuple[str, Callable[[Axes], None]]] = {}
-    for name in [symbol.name for symbol in model.x]:
-        about = (
-            f"{name}: the estimate with a band of two standard deviations, and smoothed, given the "
-            "whole record."
-        )
-        pictures[f"state-{name}"] = about, partial(_component, times, columns, name)
-    for name, passed in zip(model.measured, result.examined.passed[:, 0].T, strict=True):
-        about = (
-            f"Innovations of {name} between bounds of two standard deviations; 95 of 100 lie "
-            "within if the filter is right."
-        )
-        pictures[f"innovations-{name}"] = about, partial(_innovations, times, columns, name, passed)
-        about = (
-            f"Correlation of the innovations of {name} with later ones; between the bounds in 95 "
-            "of 100 lags if they are white."
-        )
-        pictures[f"whiteness-{name}"] = about, partial(_whiteness, columns, name, passed)
-    content = {
-        "result": result,
-        "model": lines_of(model.latex()),
-        "figures": [(name, caption) for name, (caption, _) in pictures.items()],
-        "unfit": not all(finding.fits for finding in result.findings),
+    figures: dict[str, Callable[[Axes], None]] = {
+        f"state-{symbol}": partial(_component, times, columns, symbol.name) for symbol in model.x
     }
+    for name, passed in zip(model.measured, result.examined.passed[:, 0].T, strict=True):
+        figures[f"innovations-{name}"] = partial(_innovations, times, columns, name, passed)
+        figures[f"whiteness-{name}"] = partial(_whiteness, columns, name, passed)
+    content = {"result": result, "model": lines_of(model.latex()), "figures": [*figures]}
     with replacing_together(folder) as place:
         with (place / "estimate.csv").open("w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file, lineterminator="\n")
@@ -230,7 +213,7 @@ def write_record(result: Analysis, folder: Path) -> None:
                 rows.writerow(
                     [time, *("" if np.isnan(value) else f"{value:.10g}" for value in row)]
                 )
-        for name, (_, draw) in pictures.items():
+        for name, draw in figures.items():
             save_figure(draw, place, name)
         save_texts(("record.html",), place, content)
         (place / "record.html").rename(place / "report.html")

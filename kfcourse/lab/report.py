@@ -40,7 +40,7 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 
 LANGUAGES = tuple(WORDS)
-RECOGNISED = 1600  # trajectories on which modes are told
+RECOGNISED = 400  # trajectories on which modes are told: shares are good to some thousandths
 # the line's own &
 ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -88,7 +88,7 @@ def _report(
 
 def remarks_in_words(result: Comparison) -> list[str]:
     """What a reader must know before he relies on distances from the bound, for a terminal."""
-    return [text.replace("$", "") for text in _report(result).remarks()]
+    return [block.text.replace("$", "") for block in _report(result).remarks()]
 
 
 def save_figure(draw: Callable[[Axes], object], folder: Path, name: str) -> None:
@@ -105,7 +105,7 @@ def save_figure(draw: Callable[[Axes], object], folder: Path, name: str) -> None
     with matplotlib.rc_context({"svg.hashsalt": name}):  # else its marks have random names
         for kind, metadata in _UNDATED.items():
             figure.savefig(folder / f"{name}.{kind}", format=kind, metadata=metadata)
-            figure.set_layout_engine("none")  # has been laid out
+            figure.set_layout_engine(None)  # has been laid out
 
 
 def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any]) -> None:

@@ -37,24 +37,19 @@ class JumpReport(StudentReport):
         ):
             yield self.text(key)
             yield formulas(lines_of(equations_latex(equations)))
-        of_memory = dict.fromkeys(MEMORIES, "about_memory")
-        about = {
-            "imm": "about_imm",
-            "gpb2": "about_gpb2",
-            **of_memory,
-            "averaged": "about_averaged",
-        }
-        titles: dict[str, list[str]] = {}
+        names: dict[str, list[str]] = {}
         for name in self.result.entrants:
             known = entry(name)
             averaged = known.functions == "averaged" or known.family == "duof"
-            titles.setdefault("averaged" if averaged else known.family, []).append(self.title(name))
+            names.setdefault("averaged" if averaged else known.family, []).append(name)
         lines = [
             self.phrase(
-                text, names=", ".join(titles[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$"
+                "about_memory" if kind in MEMORIES else f"about_{kind}",
+                names=self.titles(names[kind]),
+                memory=f"$\\zeta_k = {MEMORIES.get(kind)}$",
             )
-            for key, text in about.items()
-            if key in titles
+            for kind in ("imm", "gpb2", *MEMORIES, "averaged")
+            if kind in names
         ]
         if lines:
             yield Block("subsection", words["others"])

@@ -102,6 +102,7 @@ class StudentReport:
         self.kinds = [kind for kind in ("linearised", "gaussian") if kind in used]
         # kinds whose formulas are not too long
         self.derivable: list[str] = []
+        self.zero = "bound" if result.has_bound else "control"
         compared = result.has_bound or len(result.entrants) > 1
         self.figures = [
             name for name in plots.FIGURES if compared or name not in ("relative", "ranking")
@@ -201,8 +202,7 @@ class StudentReport:
             )
             yield formulas([chain, rf"q &= {matrix(model.first[None])}"])
         yield self.text("independent")
-        titles = ", ".join(map(self.title, self.result.entrants))
-        yield self.text("find", filters=titles)
+        yield self.text("find", filters=self.titles(self.result.entrants))
 
     def in_modes(
         self, make: Callable[[Model], Iterable[Block]], every: str = ""
@@ -357,14 +357,13 @@ class StudentReport:
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
         yield self.section("experiment")
-        size = {"runs": result.runs, "steps": result.steps, "seed": str(result.seed)}
-        sentences = [self.phrase("experiment_text", **size)]
+        yield self.text(
+            "experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed)
+        )
         if result.designed:
-            titles = ", ".join(map(self.title, result.designed))
-            sentences.append(self.phrase("designs", filters=titles))
+            yield self.text("designs", filters=self.titles(result.designed))
         if result.has_bound:
-            sentences.append(words["exact"])
-        yield Block("text", " ".join(sentences))
+            yield self.text("exact")
         if result.left_out:
             yield self.text("left_out")
             yield Block("items", lines=list(self.left_out()))
@@ -377,8 +376,7 @@ class StudentReport:
             ]
             key = "table_goes_on" if start else "table"
             yield self.table(key, ["step", *map(self.title, names)], rows)
-        for text in self.remarks():
-            yield Block("text", text)
+        yield from self.remarks()
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
             yield Block(
@@ -401,34 +399,28 @@ class StudentReport:
             yield self.table("share_table", ["filter", "share"], [*rows, guess])
             yield Block("figure", words["figure_modes"], ["modes"])
 
-    def remarks(self) -> Iterator[str]:
+    def remarks(self) -> Iterator[Block]:
         """What a reader must know before he relies on distances from the bound."""
         result = self.result
         steps = {"rounding": result.without_error, "doubtful": result.doubtful}
-        if result.lost:
-            steps["diverged"] = np.any([*result.lost.values()], axis=0)
+        steps["diverged"] = np.any([*result.lost.values()], axis=0)
         for kind, mask in steps.items():
             if mask.any():
-                whose, at = (
-                    ", ".join(map(self.title, result.lost)),
-                    self.at(np.flatnonzero(mask).tolist()),
-                )
-                yield self.phrase(f"remark_{kind}", names=whose, at=at)
+                at = self.at(np.flatnonzero(mask).tolist())
+                yield self.text(f"remark_{kind}", names=self.titles(result.lost), at=at)
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
         names: dict[str, list[str]] = {}
         for name, reason in self.result.left_out.items():
-            names.setdefault(self.cause(reason), []).append(self.title(name))
-        yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
+            names.setdefault(self.cause(reason), []).append(name)
+        yield from (f"{self.titles(those)}: {reason}" for reason, those in names.items())
 
     def conclusion(self) -> Iterator[Block]:
         result = self.result
         yield self.section("conclusion")
         if len(result.entrants) == 1:
-            yield Block(
-                "text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control")
-            )
+            yield Block("text", self.mean_sentence(f"alone_{self.zero}"))
             return
         verdicts = result.verdicts()
         yield self.text("verdict_text", level=LEVEL)
@@ -436,7 +428,7 @@ class StudentReport:
             [
                 f"${k}$",
                 self.title(best),
-                ", ".join(map(self.title, others)) or "–",
+                self.titles(others) or "–",
                 self.title(worst) if worst else "–",
             ]
             for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
@@ -466,9 +458,7 @@ class StudentReport:
             yield words["nobody_last"]
         # the control, or its equal
         leads = not result.has_bound and abs(float(result.ranking()[0][1].value)) < ALIKE
-        yield self.mean_sentence(
-            "mean_first" if leads else "mean_bound" if result.has_bound else "mean_control"
-        )
+        yield self.mean_sentence("mean_first" if leads else f"mean_{self.zero}")
 
     def at(self, steps: list[int]) -> str:
         """At step 2; at steps 0–1, 3–50."""
@@ -499,6 +489,9 @@ class StudentReport:
 
     def title(self, name: str) -> str:
         return title(name, self.words)
+
+    def titles(self, names: Iterable[str]) -> str:
+        return ", ".join(map(self.title, names))
 
 
 def score_cells(result: Comparison, name: str) -> list[str]:

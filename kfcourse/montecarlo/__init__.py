@@ -10,7 +10,6 @@ comparison  `Comparison`: error variances, paired differences, ranking, distance
             filter
 modes       how well filters know the mode of a model that jumps
 cramer_rao  `posterior_bound`: what no filter can beat, without running one
-parallel    threads of this machine, or the workers of a Dask scheduler
 """
 
 BATCHES = 64  # of a comparison: standard errors from 64 batches are themselves good to 9 %

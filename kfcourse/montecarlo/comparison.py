@@ -265,13 +265,13 @@ class Comparison:
             *(name for name in others if self._p_value(name, best)[step] > 1 - CONFIDENCE),
         ]
 
-    def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:
+    def verdicts(self) -> list[Verdict]:
         """For each step the most accurate entrant, who is not significantly worse, and who is the
         least accurate.
 
-        With the confidence all of them are right: Holm's test of everybody's difference from the
-        most accurate, over all steps
-        and filters.  Where all errors are rounding, nobody is better.
+        With a confidence of 95 % all of them are right: Holm's test of everybody's difference from
+        the most accurate, over all steps and filters.  Where all errors are rounding, nobody is
+        better.
         """
         ranked = self._ranked
         pairs = {(name, best) for best, *others in ranked for name in others}
@@ -282,7 +282,7 @@ class Comparison:
                 for k, (best, *others) in enumerate(ranked)
             ]
         )
-        worse = rejected(p, 1 - confidence)
+        worse = rejected(p, 1 - CONFIDENCE)
         return [
             Verdict(
                 best,

@@ -124,10 +124,6 @@ def _information(
             f"the {what} equation leaves a component without noise: there is no density, and no "
             f"bound of this kind"
         )
-    if model.n == 1 and isinstance(zeros := sp.solveset(S[0], model.x[0], sp.Reals), sp.FiniteSet):
-        raise ValueError(
-            _infinite(what, f"its noise vanishes at {model.x[0]} = {', '.join(map(str, zeros))}")
-        )
     slope = equation.subs(at_mean).jacobian(sp.Matrix(model.x))
     functions = model.compiled([model.x], [slope, S, *(S.diff(x) for x in model.x)])
 

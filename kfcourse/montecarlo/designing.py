@@ -57,9 +57,9 @@ def design(
     for filter_ in filters:
         expect(filter_, Design, "design", Filter)
     designs = [filter_ for filter_ in filters if isinstance(filter_, Design)]
-    coefficients: list[list[list[Affine]]] = [[] for _ in designs]
-    states = list[State]()
-    with joblib.Parallel(jobs, prefer="threads") as parallel:
+    states: Sequence[State] = []
+    coefficients = list[tuple[list[Affine], ...]]()
+    with joblib.Parallel(jobs, "threading") as parallel:
         for k, instant in enumerate(ensemble if designs else ()):
             if k == 0:
                 check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
@@ -69,10 +69,9 @@ def design(
                 joblib.delayed(_fitted)(design_, state, instant, k)
                 for design_, state in zip(designs, states, strict=True)
             )
-            states = [state for state, _ in results]
-            for table, (_, fits) in zip(coefficients, results, strict=True):
-                table.append(fits)
-    tables = iter(coefficients)
+            states, fits = zip(*results, strict=True)
+            coefficients.append(fits)
+    tables = zip(*coefficients, strict=True)
     return [
         filter_.with_coefficients(next(tables)) if isinstance(filter_, Design) else filter_
         for filter_ in filters

@@ -18,8 +18,6 @@ from kfcourse.montecarlo.experiment import walk
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 
-SLOW = 8  # a slow filter runs on so many times fewer trajectories
-
 
 class Recognised(NamedTuple):
     """What filters know of the modes.
@@ -47,26 +45,24 @@ class Recognised(NamedTuple):
 def recognised(
     filters: Sequence[Filter | Design], model: JumpModel, runs: int, steps: int, seed: int
 ) -> Recognised:
-    """Run those of the filters that carry probabilities of modes on common trajectories, slow ones
-    on an eighth of them; without one that cannot go on.
+    """Run those of the filters that carry probabilities of modes on common trajectories; without
+    one that cannot go on.
 
     The standard errors are those of means over independent trajectories.
     """
     _, y, mode = simulate(model, runs, steps, seed)
-    least = max(runs // SLOW, 2)
-    shown = int(np.argmax([len(np.unique(trajectory)) for trajectory in mode[:, :least].T]))
+    shown = int(np.argmax([len(np.unique(trajectory)) for trajectory in mode.T]))
     share, there = {}, {}
     for filter_ in filters:
         if not (isinstance(filter_, Filter) and hasattr(filter_.init(1).memory, "probability")):
             continue
-        size = least if filter_.slow else runs
-        after = islice(walk(filter_, y[:, :size]), 1, None)
+        after = islice(walk(filter_, y), 1, None)
         try:
-            chances = np.stack([state.memory.probability for state in after])  # (steps, size, J)
+            chances = np.stack([state.memory.probability for state in after])  # (steps, runs, J)
         except (Refused, NotFinite):
             continue
-        right = (chances.argmax(axis=2) == mode[:, :size]).mean(axis=0)
-        share[filter_.name] = Estimate(right.mean(), right.std(ddof=1) / np.sqrt(size), size - 1)
+        right = (chances.argmax(axis=2) == mode).mean(axis=0)
+        share[filter_.name] = Estimate(right.mean(), right.std(ddof=1) / np.sqrt(runs), runs - 1)
         there[filter_.name] = chances[:, shown]
     likeliest = [
         (np.bincount(mode[k]) if model.by_state else model.law_at(k)).argmax() for k in range(steps)

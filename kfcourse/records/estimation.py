@@ -146,9 +146,9 @@ def estimate(
         last = ", ".join(f"{name} = {float(best.parameters[name]):.6g}" for name in names)
         # a gate's likelihood jumps where a measurement begins to pass
         raise ValueError(
-            f"no maximum of the likelihood was found ({result.message}; last at {last}): begin "
-            "nearer to it, fix a parameter, or leave out the measurements that a gate refuses, "
-            "in the place of the gate"
+            f"no maximum of the likelihood was found; the search ended at {last}: begin nearer to "
+            "it, fix a parameter, or leave out the measurements that a gate refuses, in the place "
+            "of the gate"
         )
     noise = 10 * np.finfo(float).eps * abs(result.fun) / STEP**2
     variance, flat = _inverse(information, unit, names, noise)

@@ -17,6 +17,7 @@ nodes (`kfcourse.filters.exact`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 from kfcourse.angles import difference
@@ -144,7 +145,4 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
 
         return Structure(structure.name, model, predict, measure, lambda z, p: Transition(A, Q))
 
-    first = at(0)
-    return Structure(
-        structure.name, model, first.predict, first.measure, first.transition, at_step=at
-    )
+    return replace(at(0), at_step=at)

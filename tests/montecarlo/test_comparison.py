@@ -14,7 +14,7 @@ from kfcourse import Comparison, Ensemble, Gaussian, Model, compare, gaussian, l
 from kfcourse.filters import aof, duof, fos, kalman_filter, mfos, particle, pointmass
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.ensemble import side_by_side, stratified, weights
-from kfcourse.montecarlo.experiment import batch_sizes
+from kfcourse.montecarlo.experiment import WIDE, batch_sizes
 from kfcourse.montecarlo.statistics import Estimate, claimed, rejected
 
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
@@ -175,6 +175,11 @@ def test_weights_make_up_for_the_wider_law():
         for sample, truth in ((w, 1.0), (w * x[:, 0], 1.0), (w * (x[:, 0] - 1) ** 2, 4.0)):
             oracles.is_mean(truth, sample)
     assert (weights(prior, x, None) == 1).all()
+    # of an estimate of M x^4, which far states carry, the variance is a third for it
+    x = np.linspace(-14, 14, 2001)[:, None]
+    carried = x[:, 0] ** 8 * stats.norm.pdf(x[:, 0])
+    part = weights(Gaussian(np.zeros(1), np.eye(1)), x, WIDE) @ carried / carried.sum()
+    assert part == pytest.approx(1 / 3, abs=0.05)
 
 
 # ---------------------------------------------------------------- the bound

@@ -85,10 +85,8 @@ def test_two_steps_are_the_corner_of_the_inverse_information_of_both_states():
 
 
 def test_a_noise_that_vanishes_tells_everything_and_so_bounds_nothing():
-    with pytest.raises(
-        ValueError, match=r"information is infinite, and .* \(its noise vanishes at x = -2\)"
-    ):
-        posterior_bound(find_variant("6").model, 100, 2, seed=1)
+    with pytest.raises(ValueError, match=r"information is infinite, .* hangs on one trajectory"):
+        posterior_bound(find_variant("6").model, 1000, 2, seed=1)
 
 
 def test_what_jumps_tells_more_than_its_slopes():

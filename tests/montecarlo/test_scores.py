@@ -127,7 +127,8 @@ def test_what_is_drawn_from_a_prediction_has_its_crps(model, build):
     compared = compare(filters, model, 1000, 4, seed=3, scores=gaussian(model))
     apart = compared.crps(filters[0].name, minus=normal.name)
     assert (np.abs(apart.value) < 4 * apart.standard_error).all()
-    assert (apart.standard_error < 0.03 * compared.crps(normal.name).value).all()
+    # with 16 draws 0.0103; half as many have 0.0135
+    assert (apart.standard_error / compared.crps(normal.name).value).mean() < 0.0117
 
 
 def test_where_the_density_is_nothing_at_a_point():

@@ -6,8 +6,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import Model, ModelError, linearised, simulate
-from kfcourse.filters import aof
+from kfcourse.filters import aof, gated
 from kfcourse.records import estimate, profile
+from kfcourse.records.estimation import _derivatives
 from kfcourse.scenarios.benchmarks import local_level, nile
 
 pytestmark = pytest.mark.quick
@@ -110,3 +111,22 @@ def test_a_search_that_leaves_the_model_names_the_parameter():
     with pytest.raises(ValueError, match=r"a small change of q leaves no.*: declare q positive"):
         estimate(walk, y, ["q"])
     assert 0 < estimate(walk, y, ["q"], ["q"]).value < 0.1
+
+
+def test_a_likelihood_that_jumps_has_no_maximum_to_be_found():
+    """A gate of 90 % before measurements three times as large: some begin to pass on the way."""
+    model = Model.define("0.9*x + v", "x + sqrt(r)*w", {"r": 1.0})
+    y = 3 * simulate(model, 1, 60, seed=0).y
+    with pytest.raises(
+        ValueError, match=r"was found; the search ended at r = 0\.\d+: begin nearer"
+    ):
+        estimate(model, y, ["r"], ["r"], build=lambda each: gated(aof(linearised(each)), 0.9))
+
+
+def test_second_differences_of_a_likelihood_of_a_thousand_are_good_to_six_digits():
+    """A step twice as large errs by more, and half of it lets more rounding through."""
+    errors = [
+        _derivatives(lambda c: 1000 + np.exp(c[0]), np.array([c]))[1].item() - np.exp(c)
+        for c in np.linspace(-0.1, 0.1, 200)
+    ]
+    assert np.abs(errors).max() < 3e-7
