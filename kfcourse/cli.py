@@ -165,6 +165,7 @@ def main() -> None:
     "thousand trajectories.",
 )
 @JOBS
+@click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
 @click.option("--out", type=PATH, help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report",
@@ -194,6 +195,7 @@ def lab(
     names: str | None,
     bound: bool,
     jobs: int,
+    dask: str | None,
     out: Path | None,
     language: str,
     scores: bool,
@@ -233,8 +235,10 @@ def lab(
     folder = out or _below(f"lab-{chosen.name}")
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    judge = judging(model) if scores else None
-    result = compare(filters, model, runs, steps or chosen.steps, seed, jobs=jobs, scores=judge)
+    result = compare(
+        filters, model, runs, steps or chosen.steps, seed, jobs=jobs,
+        dask=dask, scores=judging(model) if scores else None,
+    )  # fmt: skip
     result = replace(result, left_out={**refused, **result.left_out})
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)

@@ -10,6 +10,7 @@ comparison  `Comparison`: error variances, paired differences, ranking, distance
             filter
 modes       how well filters know the mode of a model that jumps
 cramer_rao  `posterior_bound`: what no filter can beat, without running one
+parallel    the workers of a Dask scheduler in the place of threads
 """
 
 BATCHES = 64  # of a comparison: standard errors from 64 batches are themselves good to 9 %

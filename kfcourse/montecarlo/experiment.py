@@ -30,6 +30,7 @@ from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import check_sizes, design, failed
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, check_finite, side_by_side, weights
+from kfcourse.montecarlo.parallel import cluster
 from kfcourse.montecarlo.scores import scored
 from kfcourse.montecarlo.statistics import Sums, claimed
 from kfcourse.symbolic.angular import warn_of_degrees
@@ -136,6 +137,7 @@ def compare(
     smoothers: Sequence[Filter] = (),
     scores: Structure | None = None,
     jobs: int | None = None,
+    dask: str | None = None,
     progress: bool | None = None,
 ) -> Comparison:
     """Compare filters on common trajectories of a model.
@@ -165,9 +167,10 @@ def compare(
         Judge each filter's prediction of the measurement, too (`Comparison.log_score`, `crps`): by
         these structural functions where a filter has none of its own.
     jobs : int, optional
-        How many threads share the work, by default one for each processor core.  Within
-        `dask.distributed.Client(address).as_current()` and `joblib.parallel_config("dask")` the
-        workers of that Dask scheduler run the filters instead; designed is here.
+        How many threads share the work, by default one for each processor core.
+    dask : str, optional
+        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters;
+        the numbers are the same but for rounding.  Designed is here.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 
@@ -204,10 +207,11 @@ def compare(
         return design(those, shown, jobs)
 
     ready = _able(filters, left_out, designed)
-    result = _compared(ready, batches, seed, left_out, scores=scores, **work)
-    if smoothers:
-        looking_back = _compared(smoothers, batches, seed, {}, back=True, **work)
-        result = replace(result, smoothing=looking_back)
+    with cluster(dask):
+        result = _compared(ready, batches, seed, left_out, scores=scores, **work)
+        if smoothers:
+            looking_back = _compared(smoothers, batches, seed, {}, back=True, **work)
+            result = replace(result, smoothing=looking_back)
     if same_ensemble:
         return result
     designs = [filter_.name for filter_ in filters if isinstance(filter_, Design)]
