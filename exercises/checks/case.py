@@ -68,22 +68,12 @@ class Case:
     @property
     def numbers(self) -> list[np.ndarray]:
         """All numbers of both sides."""
-        return [
-            np.concatenate([np.ravel(values) for values in side])
-            for side in (self.answered, self.expected)
-        ]
+        return [np.concatenate([*map(np.ravel, side)]) for side in (self.answered, self.expected)]
 
     @property
     def formulas(self) -> list[list[sp.Expr]]:
         """All formulas of both sides."""
-        return [
-            [
-                formula
-                for value in side
-                for formula in (value if isinstance(value, sp.MatrixBase) else [value])
-            ]
-            for side in (self.answered, self.expected)
-        ]
+        return [sp.flatten(side) for side in (self.answered, self.expected)]
 
     @property
     def others(self) -> Iterator[tuple[str, list[Any]]]:

@@ -96,11 +96,10 @@ class Wrong:
     def _mistakes(self, case: Case) -> list[Mistake]:
         """Known mistakes that one result looks like: of all, those that spoil the fewest results
         that are right; of these, those that explain the most of the wrong ones."""
-        seen = [(mistake, would) for mistake, would in self.posed.known if case.given(would)]
-        ranks = [self._rank(would) for _, would in seen]
-        return [
-            mistake for (mistake, _), rank in zip(seen, ranks, strict=True) if rank == max(ranks)
-        ]
+        known = self.posed.known
+        seen = [(self._rank(would), mistake) for mistake, would in known if case.given(would)]
+        best = max((rank for rank, _ in seen), default=(0, 0))
+        return [mistake for rank, mistake in seen if rank == best]
 
     def _rank(self, would: Sequence[Any]) -> tuple[int, int]:
         fits = [case for case in self.cases if case.given(would)]

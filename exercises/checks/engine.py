@@ -97,13 +97,9 @@ def _formed(result: Any, wanted: Any) -> Any:
     try:
         return like(result, wanted)
     except Unusable as reason:
-        if (
-            not isinstance(wanted, tuple)
-            or not isinstance(result, tuple | list)
-            or len(result) != len(wanted)
-        ):
-            raise
-        if any(_fits(order, wanted) for order in permutations(result)):
+        several = isinstance(wanted, tuple) and isinstance(result, tuple | list)
+        orders = permutations(result) if several and len(result) == len(wanted) else ()
+        if any(_fits(order, wanted) for order in orders):
             raise Unusable(f"{reason}: are the results in another order?") from None
         raise
 

@@ -20,8 +20,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from kfcourse.exercises.derivations.setting import KINDS, Setting, of_model
-from kfcourse.exercises.derivations.terms import Node
-from kfcourse.exercises.derivations.typed import read_line
 from kfcourse.symbolic.formula import check_name
 from kfcourse.symbolic.model import Model
 
@@ -40,10 +38,6 @@ class Typed(NamedTuple):
     line: int
     column: int
     text: str
-
-    def read(self, setting: Setting) -> Node:
-        """Its tree; FormulaError with the place in the whole line."""
-        return read_line(self.text, setting.problem)
 
 
 @dataclass

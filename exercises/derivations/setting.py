@@ -140,10 +140,6 @@ class Setting:
             waiting += [self.meanings[name] for name in new - {closed} if name in self.meanings]
         return seen
 
-    def defining(self, name: str, tree: Node) -> Setting:
-        """The same where a name stands for what was derived."""
-        return replace(self, meanings={**self.meanings, name: tree})
-
 
 def of_model(model: Model, kind: str = "gaussian") -> Setting:
     """The setting of a model: its parameters, noises and structural functions; tau and Theta take x

@@ -6,13 +6,14 @@ on top of it, or wrong in itself; or it is right in itself, equal to what stood 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from kfcourse.exercises.derivations.chains import Chain, FindModel, Typed, read_chains
 from kfcourse.exercises.derivations.setting import Law, Setting, of_side
 from kfcourse.exercises.derivations.slips import find_slips, named
 from kfcourse.exercises.derivations.terms import Node, at, letter
+from kfcourse.exercises.derivations.typed import read_line
 from kfcourse.exercises.derivations.values import (
     EQUAL,
     IF_POSITIVE,
@@ -173,7 +174,8 @@ class _Checking:
         self.setting = of_side(chain.setting, self.name)
         for name, (law, tree) in derived.items():
             if law == self.setting.law and name != self.name:
-                self.setting = self.setting.defining(name, tree)
+                meanings = {**self.setting.meanings, name: tree}
+                self.setting = replace(self.setting, meanings=meanings)
         meant = self.name in self.setting.meanings
         self.previous = self.right = letter(self.name) if meant else None
         self.above, self.broken = "" if self.name else first.text, 0
@@ -185,7 +187,7 @@ class _Checking:
             node = None
             try:
                 with time_limit(SECONDS):
-                    node = link.read(self.setting)
+                    node = read_line(link.text, self.setting.problem)
                     self._judge(link, node)
             except FormulaError as error:
                 self._says(link, UNREADABLE, _marked(link, error))

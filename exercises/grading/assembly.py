@@ -59,7 +59,7 @@ def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], 
     cells = [cell for cell in cells if cell.code]
     code = [(index, cell) for index, cell in enumerate(master.cells) if cell.cell_type == "code"]
     checks = check_cells(master)
-    place = _places(code, checks, cells)
+    places, taken = _places(code, checks, cells)
     ordered = [(index, -1, Step(cell.source, "the first cell")) for index, cell in code[:1]]
     for index, cell in code[1:]:
         where = (
@@ -72,11 +72,11 @@ def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], 
             ordered.append(
                 (index, 0, Step(cell.source, where, False, names, tuple(checks[cell.id])))
             )
-        elif index not in place.taken:
+        elif index not in taken:
             ordered.append((index, 0, Step(cell.source, where)))
-    own = [cell for cell in cells if cell.number in place.of]
+    own = [cell for cell in cells if cell.number in places]
     ordered += [
-        (place.of[cell.number], cell.number, Step(cell.source, cell.name, True)) for cell in own
+        (places[cell.number], cell.number, Step(cell.source, cell.name, True)) for cell in own
     ]
     return [step for *_, step in sorted(ordered, key=lambda row: row[:2])], own
 
@@ -103,17 +103,11 @@ def lost(master: NotebookNode, cells: Sequence[Cell]) -> dict[str, str]:
     return fates
 
 
-class Places(NamedTuple):
-    """of: number of a student's cell to the index of the master's cell that it replaces or follows;
-    taken: those replaced."""
-
-    of: dict[int, int]
-    taken: set[int]
-
-
 def _places(
     code: Sequence[tuple[int, NotebookNode]], checks: Mapping[str, list[str]], cells: Sequence[Cell]
-) -> Places:
+) -> tuple[dict[int, int], set[int]]:
+    """Number of a student's cell to the index of the master's cell that it replaces or follows; and
+    those that are replaced."""
     by_id = {cell.id: index for index, cell in code}
     answers = {
         cell.metadata["kfcourse"]["answer"]: index
@@ -162,7 +156,7 @@ def _places(
         else:  # a cell of the master's, as it was
             asked = [asked_at[question] for question in _asked(cell.source) if question in asked_at]
             last = asked[-1] if asked else unchanged.get(_plain(cell.source), last)
-    return Places(of, taken)
+    return of, taken
 
 
 def _plain(source: str) -> str:

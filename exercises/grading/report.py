@@ -8,11 +8,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WEIGHTS, WRONG
-from kfcourse.exercises.derivations.wording import coded
 from kfcourse.exercises.grading.owners import Person, known_sets, people, same_code
 from kfcourse.exercises.grading.results import (
     NOT_GRADED,
@@ -30,6 +27,7 @@ from kfcourse.exercises.grading.weights import (
     worth,
 )
 from kfcourse.exercises.notebooks.course_list import Student
+from kfcourse.exercises.notebooks.texts import page as written
 from kfcourse.exercises.notebooks.texts import write_csv
 from kfcourse.files import save
 
@@ -158,7 +156,7 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
         ]
         parts.append((sets()[letter], grade, rows, possible([letter])))
     (row,) = student_rows([person], letters, credit)
-    return _page(
+    return written(
         "feedback",
         person=person,
         sets=parts,
@@ -182,7 +180,7 @@ def overview(
     rows = zip(
         student_rows(persons, letters, credit), (page.as_posix() for page in pages), strict=True
     )
-    return _page(
+    return written(
         "overview",
         students=sorted(rows, key=lambda row: (row[0]["group"], row[0]["name"])),
         persons=persons,
@@ -195,10 +193,3 @@ def overview(
         credit=credit,
         protection=protection,
     )
-
-
-def _page(name: str, **values: Any) -> str:
-    loader = jinja2.PackageLoader("kfcourse.exercises.notebooks")
-    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
-    environment.filters["coded"] = coded
-    return environment.get_template(f"{name}.html.j2").render(**values)

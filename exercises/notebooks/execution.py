@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-import jinja2
 import nbformat
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
@@ -22,6 +21,7 @@ from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 
 from kfcourse.exercises.checks.question import MIME
+from kfcourse.exercises.notebooks.texts import page as written
 from kfcourse.symbolic.markup import mathml as formula
 
 # a cell may take: what needs a student's minute alone shares a busy machine here
@@ -142,12 +142,7 @@ def html(executed: NotebookNode, title: str) -> str:
             if "text/markdown" in data:
                 data["text/markdown"] = mathml(data["text/markdown"])
     body, resources = HTMLExporter(template_name="basic").from_notebook_node(copy)
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kfcourse.exercises.notebooks"), autoescape=True
-    )
-    return environment.get_template("notebook.html.j2").render(
-        title=title, body=body, colours=resources["inlining"]["css"][-1]
-    )
+    return written("notebook", title=title, body=body, colours=resources["inlining"]["css"][-1])
 
 
 def mathml(text: str) -> str:

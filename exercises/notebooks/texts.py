@@ -10,6 +10,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import jinja2
+
+from kfcourse.exercises.derivations.wording import coded
 from kfcourse.files import save
 
 FORMULA = ("=", "+", "-", "@")  # full-width ones are taken for these
@@ -27,6 +30,14 @@ def clean(text: str, length: int = 200) -> str:
     line = "".join(c if c.isprintable() else " " for c in text)
     line = " ".join(line.split())
     return line if len(line) <= length else line[: length - 1] + "…"
+
+
+def page(name: str, **values: Any) -> str:
+    """A page of HTML from a template of this folder; `coded` marks code in a text."""
+    loader = jinja2.PackageLoader("kfcourse.exercises.notebooks")
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
+    environment.filters["coded"] = coded
+    return environment.get_template(f"{name}.html.j2").render(**values)
 
 
 def write_csv(columns: Sequence[str], rows: Iterable[Mapping[str, Any]], path: Path) -> None:

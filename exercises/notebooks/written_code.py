@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,11 @@ from kfcourse.symbolic.sides import Side, plain
 COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
 
 
+@dataclass(frozen=True)
 class Solutions:
     """Lines of Python that compute a derived formula, for the solution cells of masters."""
 
-    def __init__(self, exercise: Exercise):
-        self.exercise = exercise
+    exercise: Exercise
 
     def functions(self, kind: str, side: str) -> str:
         """Body of a function of (z, p) or (m, d) that returns (tau, Theta) or (h, G, F)."""
