@@ -204,7 +204,7 @@ ROOMS = {
     "exercises/notebooks": 7_940,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_220,
-    "kfcourse/continuous": 9_900,
+    "kfcourse/continuous": 9_910,
     "kfcourse/filters": 30_470,
     "kfcourse/lab": 19_060,
     "kfcourse/linear": 5_550,

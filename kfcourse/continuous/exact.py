@@ -98,9 +98,9 @@ def by_substeps(
     """The exact filter of a scalar model with `between`; the clock says how long an interval is,
     and what is known in it.
 
-    An interval gets so many sub-steps that half of them change the mean and deviation of no
-    posterior behind it by more than the accuracy, in deviations; what they change is in the stated
-    error.
+    An interval gets so many sub-steps that mean and deviation of no posterior behind it err by more
+    than the accuracy, in deviations.  What half of them change tells; the stated error takes it for
+    twice what is left, or three times.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def by_substeps(
         `COUNTS`.
     """
     moves, symbols = normal_step(model), (*model.known.symbols, H)
-    # of the first order the rest is as large as what the last halving changed; of the second less
+    # what is left of the first order is what the last halving changed, of the second a third of it
     doubt = 2 if model.between.diffusion.has(*model.x) else 1
     exact = Exact(moves, printed(replace(moves, known=Known(symbols))), accuracy)
 
@@ -147,7 +147,7 @@ def by_substeps(
             coarse = fine if substeps == 0 else coarse
             if coarse:
                 error = doubt * apart(coarse.posterior, fine.posterior, model.angles.x)
-                if error.max() <= accuracy:
+                if error.max() <= 2 * accuracy:
                     posterior = fine.memory._replace(error=fine.memory.error + error)
                     return fine._replace(step=state.step + 1, memory=Underway(posterior, substeps))
             coarse, reason = fine, "they are too few"
