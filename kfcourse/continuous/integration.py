@@ -43,7 +43,9 @@ FEW = 64
 # many, some seconds
 STEPS, MOST_STEPS = 2_000, 10_000
 SEEN = 100  # steps after which their length tells how many there will be
-NEAR = 1e-3  # of a mean that has no variance: a part of it stands for the standard deviation
+# of a mean that has no variance a part that stands for the standard deviation: a billionth of the
+# mean is then right by the usual accuracy
+NEAR = 1e-3
 
 # (known, z, p) -> M[a], A, M[B B^T]
 Rates: TypeAlias = Callable[[Array, Vectors, Matrices], tuple[Array, ...]]

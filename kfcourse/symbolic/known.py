@@ -105,10 +105,14 @@ class Known:
         return values[k]
 
     def latex(self, time: str = "t") -> list[str]:
-        """The line of an `aligned` block that says which time a step has, if the equations contain
-        it."""
+        """Lines of an `aligned` block: the time of a step, and the first values of the inputs."""
         clock = symbol("t") in self.symbols and "t" not in self.inputs
-        return [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"] if clock else []
+        lines = [rf"{time} &= {sp.latex(self.interval * symbol('k'))}"] if clock else []
+        for name, values in self.inputs.items():
+            letter, more = sp.latex(symbol(name)), [r"\ldots"] if len(values) > 6 else []
+            listed = ", ".join([*(f"{value:g}" for value in values[:6]), *more])
+            lines.append(rf"{letter}_0, {letter}_1, \ldots &= {listed}")
+        return lines
 
 
 def _sequence(name: str, given: Any) -> tuple[float, ...]:

@@ -6,10 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.sparse.linalg
+import sympy as sp
 from numpy.testing import assert_allclose
 
 from kfcourse import compare, gaussian, likelihood, linearised, predictions, run, simulate
 from kfcourse.continuous import benes_filter, sampled
+from kfcourse.continuous.exact import phi
 from kfcourse.filters import aof, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
 from kfcourse.montecarlo.experiment import states
@@ -89,6 +91,14 @@ def test_kalmans_filter_where_the_object_is_linear():
             assert_allclose(ours, kalman, rtol=0, atol=2e-5)
     # one of them would do, two tell
     assert {state.memory.substeps for state in states(exact, y)[2:]} == {2}
+
+
+def test_the_functions_of_a_sub_step_lose_no_digits_near_0():
+    u, at = sp.Symbol("u"), np.linspace(-0.1, 0.1, 998)
+    for order in (1, 2):
+        terms = [(sp.Float(1, 40) / sp.factorial(i + order)) * u**i for i in range(15)]
+        exact = [float(sum(terms).evalf(40, {u: sp.Float(x, 40)})) for x in at]
+        assert_allclose(sp.lambdify(u, phi(order, u))(at), exact, rtol=1e-12)
 
 
 def test_benes_filter_and_the_order_of_a_sub_step():
