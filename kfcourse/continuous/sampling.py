@@ -43,7 +43,7 @@ from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Known
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, Names, by_name, numbered, read
-from kfcourse.symbolic.structure import Structure, of_steps
+from kfcourse.symbolic.structure import Structure, gaussian, linearised, of_steps
 from kfcourse.symbolic.typesetting import joined
 from kfcourse.symbolic.writing import formula_latex
 
@@ -74,10 +74,12 @@ class Between:
     def structure(self, model: Model, approximation: Callable[[Model], Structure]) -> Structure:
         """Structural functions: tau and Theta by the moment equations, h, G and F of the meter as
         of every model."""
-        meter = approximation(at_rest(model))
         formulas = derived = None
-        if meter.formulas is not None:
-            z, p, *rates = derived = moment_equations(model, approximation)
+        if approximation in (gaussian, linearised):  # before the meter, which may take a minute
+            derived = moment_equations(model, approximation)
+        meter = approximation(at_rest(model))
+        if derived is not None and meter.formulas is not None:
+            z, p, *rates = derived
             names = ("tau_dot", "A", "Theta_dot", "p_dot")
             functions = dict(zip(names, [*rates, derived.rates[1]], strict=True))
             functions |= {name: meter.formulas.functions[name] for name in "hGF"}
