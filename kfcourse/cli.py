@@ -44,7 +44,14 @@ from kfcourse.lab.short_names import (
     title,
 )
 from kfcourse.lab.variants import RUNS as CHECKED
-from kfcourse.lab.variants import STEPS, find_variant, read_tables, read_variants, summary
+from kfcourse.lab.variants import (
+    STEPS,
+    TRAJECTORIES,
+    find_variant,
+    read_tables,
+    read_variants,
+    summary,
+)
 from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
@@ -54,7 +61,6 @@ from kfcourse.symbolic.model import Model
 # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
 DERIVATION = 180.0
 INSTRUCTORS = ("exercises", "grade", "solutions")
-RUNS = 20_000  # trajectories
 
 
 PATH = click.Path(path_type=Path)
@@ -139,9 +145,8 @@ def main() -> None:
 @click.option(
     "--runs",
     type=click.IntRange(min=2),
-    default=RUNS,
-    show_default=True,
-    help="Trajectories, the same for all filters.",
+    help=f"Trajectories, the same for all filters.  [default: {TRAJECTORIES}, or what the variant "
+    "says]",
 )
 @click.option(
     "--steps",
@@ -188,7 +193,7 @@ def main() -> None:
 def lab(
     variant: str,
     variants_file: Path | None,
-    runs: int,
+    runs: int | None,
     steps: int | None,
     seed: int,
     names: str | None,
@@ -235,7 +240,7 @@ def lab(
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     result = compare(
-        filters, model, runs, steps or chosen.steps, seed, jobs=jobs,
+        filters, model, runs or chosen.runs, steps or chosen.steps, seed, jobs=jobs,
         dask=dask, scores=judging(model) if scores else None,
     )  # fmt: skip
     result = replace(result, left_out={**refused, **result.left_out})

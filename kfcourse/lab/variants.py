@@ -21,12 +21,12 @@ from kfcourse.symbolic.reading import shown
 SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
 KEYS = {
     "title", "steps", "state", "meter", "interval", "angles", "transition", "first", "parameters",
-    "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes",
+    "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes", "runs",
 }  # fmt: skip
 # of an object in continuous time
 IN_TIME = {"drift", "diffusion", "instants", "stratonovich", "substeps", "accuracy"}
 OF_STEPS = {"state", "state_noise", "modes", "transition", "first"}
-STEPS = 51  # of the lab, where a variant does not say another number
+TRAJECTORIES, STEPS = 20_000, 51  # of the lab, where a variant does not say other numbers
 RUNS = 40_000  # trajectories by which a variant is checked
 MANY = 40  # names that a message lists
 
@@ -41,7 +41,8 @@ class VariantWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Variant:
-    """A variant of the lab: its name in the file, a title, its model, how many measurements.
+    """A variant of the lab: its name in the file, a title, its model, how many measurements and
+    trajectories.
 
     `table` is what it was read from.
     """
@@ -50,6 +51,7 @@ class Variant:
     title: str
     model: Model | JumpModel
     steps: int = STEPS
+    runs: int = TRAJECTORIES
     table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def plain(self, what: str) -> Model:
@@ -74,9 +76,9 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
         `title`, `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles`
         (see `Model.define`); of an object in continuous time `drift` and `diffusion` in the place
         of `state`, and `instants` (see `kfcourse.continuous.sampled`).
-        `steps` is how many measurements the lab takes.  Those with `modes`,
-        `transition`, `first` (see `JumpModel.define`), and the shipped tasks of the school's
-        program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
+        `steps` is how many measurements the lab takes, `runs` how many trajectories.  Those with
+        `modes`, `transition`, `first` (see `JumpModel.define`), and the shipped tasks of the
+        school's program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
 
     Raises
     ------
@@ -208,17 +210,17 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
         )
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(keys))}")
     try:
-        given = {key: table[key] for key in table if key not in ("title", "steps")}
+        given = {key: table[key] for key in table if key not in ("title", "steps", "runs")}
         model = (sampled if moves else JumpModel.define if jumps else Model.define)(**given)
-        steps = table.get("steps", STEPS)
-        expect_sizes(steps=steps)
+        steps, runs = table.get("steps", STEPS), table.get("runs", TRAJECTORIES)
+        expect_sizes(steps=steps, runs=runs)
     # FormulaError and ModelError are ValueErrors
     except (ValueError, TypeError, OverflowError) as error:
         raise VariantError(f"{prefix}{error}") from None
     for mode in model.modes if isinstance(model, JumpModel) else (model,):
         if problem := nothing_random(mode):
             raise VariantError(f"{prefix}{problem}")
-    return Variant(name, on_a_line(str(table.get("title", ""))), model, steps, dict(table))
+    return Variant(name, on_a_line(str(table.get("title", ""))), model, steps, runs, dict(table))
 
 
 def on_a_line(text: str) -> str:

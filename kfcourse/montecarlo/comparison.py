@@ -339,9 +339,10 @@ class Comparison:
         M|e| of a filter that claims to be sure.  For the exact filter and for particles,
         measurements are drawn from their predictions: the 95 % intervals of 2,000 trajectories of a
         linear model hold the exact filter's in 94.9 % of the cases, in 92 % at the worst step (300
-        seeds, 12 steps).  NaN for gated filters and others whose predictions are neither normal
-        laws nor mixtures of some (T. Gneiting and A. Raftery, Strictly proper scoring rules, J. Am.
-        Stat. Assoc. 102, 2007).
+        seeds, 12 steps); those of 100 particles on variant 53 their mean in 93.8 %, in 92.5 % at
+        the worst step, in 93 % of the means over steps (200 seeds, 4 steps).  NaN for gated filters
+        and others whose predictions are neither normal laws nor mixtures of some (T. Gneiting and
+        A. Raftery, Strictly proper scoring rules, J. Am. Stat. Assoc. 102, 2007).
         """
         return self._score("crps", name, minus, steps)
 

@@ -181,7 +181,10 @@ def test_sensors_of_bearings_are_fused_across_the_jump():
     the north and 20 m to the south."""
     still = Dynamics(np.zeros((2, 2)), np.zeros((2, 2)))
     prior = Gaussian(np.array([-10_000.0, 10.0]), 100.0**2 * np.eye(2))
-    sensor = Sensor.define("radar", ["e", "n"], "atan2(n, e) + w", 1e-4, 1.0, angles=["y"])
+    meter = Model.define(
+        ["e + v1", "n + v2"], "atan2(n, e) + 0.01*w", symbols={"x": ["e", "n"]}, angles=["y"]
+    )
+    sensor = Sensor("radar", meter, 1.0)
     seen = Observation("radar", 1.0, 1.0, np.array([[-PI + 2e-3]]))
     law = fuse(still, [sensor], prior, [seen], np.array([1.0]))
     assert_allclose(law.mean[0, 0], [-10_000, -5], rtol=1e-3)

@@ -116,17 +116,17 @@ def test_the_lift_is_switched_at_45_s(name):
     assert_allclose(turned, signs[:, None] * push, rtol=1e-6, atol=1e-12)
 
 
-@pytest.mark.parametrize("steps", [0, 2.5, "many"])
-def test_a_variant_says_how_many_steps_in_a_whole_number(steps):
-    with pytest.raises(
-        VariantError, match=r"variant a in here: .*steps.* must be a positive whole number.*, got"
-    ):
-        read_variant("a", {"state": "x + v", "meter": "x + w", "steps": steps}, "here")
+@pytest.mark.parametrize("given", [{"steps": 0}, {"steps": 2.5}, {"runs": "many"}])
+def test_a_variant_says_how_many_in_a_whole_number(given):
+    what = rf"variant a in here: .*{next(iter(given))}.* must be a positive whole number.*, got"
+    with pytest.raises(VariantError, match=what):
+        read_variant("a", {"state": "x + v", "meter": "x + w", **given}, "here")
 
 
-def test_the_lab_takes_the_steps_of_the_variant(command, tmp_path, no_figures):
-    result = command(
-        *["lab", "D1", "--runs", "300", "--filters", "duof", "--out", "r", "--json", "n"]
-    )
-    assert result.exit_code == 0, result.output
-    assert '"steps": 21,' in (tmp_path / "n").read_text()
+def test_the_lab_takes_the_steps_and_trajectories_of_the_variant(command, tmp_path, no_figures):
+    table = '[variants.a]\nstate = "0.9*x + v"\nmeter = "x + w"\nsteps = 3\nruns = 200\n'
+    (tmp_path / "own.toml").write_text(table)
+    options = ["--variants", "own.toml", "--filters", "duof", "--out", "r", "--json", "n"]
+    assert command("lab", "a", *options).exit_code == 0
+    numbers = (tmp_path / "n").read_text()
+    assert '"steps": 3,' in numbers and '"runs": 200,' in numbers

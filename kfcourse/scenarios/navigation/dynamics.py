@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -26,7 +26,6 @@ from kfcourse.linear.runs import check_prior
 
 # s: moments that differ by less are the same but for rounding; stamps of Unix hold 2e-7 s
 ROUNDING = 1e-6
-TRANSITIONS = 4096  # intervals remembered: sensors of fixed rates need a few, random delays many
 
 
 class Transition(NamedTuple):
@@ -167,7 +166,7 @@ def motion(
     ValueError
         Inputs that do not fit the dynamics, or begin after they are needed.
     """
-    over = lru_cache(maxsize=TRANSITIONS)(dynamics.over)
+    over = cache(dynamics.over)  # sensors of fixed rates have a few intervals
     if inputs is None:
         if dynamics.inputs:
             raise ValueError(

@@ -76,8 +76,8 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor; build it with `Sensor.define`.  `observe` takes the true ones, `fuse` those that
-    the filter believes in.
+    """A sensor; build it with `Sensor.define`, or of a `Model`, whose meter may measure angles.
+    `observe` takes the true ones, `fuse` those that the filter believes in.
 
     Attributes
     ----------
@@ -129,7 +129,6 @@ class Sensor:
         period: float,
         *,
         parameters: Mapping[str, float] | None = None,
-        angles: Sequence[str] | None = None,
         **timing: Any,
     ) -> Sensor:
         """A sensor from the formulas of its meter.
@@ -145,8 +144,6 @@ class Sensor:
             Of the noise.
         period : float
         parameters : dict, optional
-        angles : list of names, optional
-            Components of the measurement, y or y1, y2, ..., that are angles.
         **timing
             Other attributes of `Sensor`.
 
@@ -168,7 +165,6 @@ class Sensor:
             parameters,
             symbols={"x": list(states), "v": ["not_used"]},
             meter_noise={"variance": variance},
-            angles=None if angles is None else {"y": angles},
         )
         return cls(name, model, period, **timing)
 
