@@ -208,12 +208,12 @@ ROOMS = {
     "kfcourse/filters": 30_820,
     "kfcourse/lab": 19_030,
     "kfcourse/linear": 5_550,
-    "kfcourse/montecarlo": 11_290,
+    "kfcourse/montecarlo": 11_260,
     "kfcourse/pages": 8_120,
-    "kfcourse/records": 5_590,
+    "kfcourse/records": 5_570,
     "kfcourse/scenarios": 9_980,
-    "kfcourse/symbolic": 18_810,
-    "tests": 171_460,
+    "kfcourse/symbolic": 18_250,
+    "tests": 171_370,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

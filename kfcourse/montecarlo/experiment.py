@@ -33,7 +33,6 @@ from kfcourse.montecarlo.ensemble import Ensemble, Instant, side_by_side, weight
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.scores import scored
 from kfcourse.montecarlo.statistics import Sums, claimed
-from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
@@ -120,7 +119,6 @@ def measurements(filter_: Filter, y: Array) -> Array:
         raise ValueError(
             f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing"
         )
-    warn_of_degrees("a measurement", y, filter_.model.measured, filter_.model.angles.y)
     return y
 
 
