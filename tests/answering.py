@@ -40,21 +40,8 @@ BEATS = (bell(x, -1, sp.sqrt(2)), bell(y, PLACE, 0.2), bell(following, x + 0.5, 
 def sine_and_lines() -> str:
     """As in the chapter on better lines."""
     model = Model.define("x + 0.1*v", "sin(x) + 0.05*w")
-    tangent, best = linearised(model), gaussian(model)
-    (angle,), (m,), (d,) = model.x, best.formulas.m, best.formulas.d
-    lines = [(functional["h"], functional["G"]) for functional in (tangent, best)]
-    left = (best["F"] - best["G"] ** 2 * d) - (tangent["F"] - tangent["G"] ** 2 * d)
-    return explore.two_lines(
-        "fig-better-line",
-        angle,
-        m,
-        d,
-        sp.sin(angle),
-        bell(angle, m, sp.sqrt(d)),
-        *lines,
-        sp.simplify(left),
-        dict(mean=1, variance=0.4),
-    )
+    first = dict(mean=1, variance=0.4)
+    return explore.two_lines("fig-better-line", linearised(model), gaussian(model), first)
 
 
 def lab_gains() -> str:

@@ -45,6 +45,21 @@ class Case:
         return part_of(self.posed.expected, self.part)
 
     @property
+    def name(self) -> str:
+        """Of the result; none of an only one."""
+        return "" if self.part is None else self.posed.question.parts[self.part]
+
+    @cached_property
+    def right(self) -> bool:
+        return self.given(self.posed.expected)
+
+    def given(self, results: Sequence[Any], calls: Sequence[int] | None = None) -> bool:
+        """Whether this result is that of some results, in these calls or in all."""
+        would = part_of(results, self.part)
+        calls = range(len(would)) if calls is None else calls
+        return self.agree([self.answered[i] for i in calls], [would[i] for i in calls])
+
+    @property
     def numeric(self) -> bool:
         return isinstance(self.expected[0], np.ndarray)
 

@@ -15,7 +15,7 @@ from kfcourse.exercises.checks.case import Case
 from kfcourse.exercises.checks.failing import shown
 from kfcourse.exercises.checks.hints import general
 from kfcourse.exercises.checks.question import Answer, Mistake
-from kfcourse.exercises.checks.reference import Posed, part_of
+from kfcourse.exercises.checks.reference import Posed
 
 MANY = 3  # numbers that are no coincidence
 GENERAL = (
@@ -39,51 +39,49 @@ class Wrong:
     answer: Answer
     answered: list[Any]
 
-    @property
-    def parts(self) -> tuple[str, ...]:
-        return self.posed.question.parts
-
     @cached_property
-    def right(self) -> list[bool]:
-        """For each of several results, whether it is right."""
-        return [self._agrees(place, self.posed.expected) for place in range(len(self.parts))]
+    def cases(self) -> list[Case]:
+        """Each of its results."""
+        places: Sequence[int | None] = range(len(self.posed.question.parts)) or [None]
+        return [Case(self.posed, self.answer, self.answered, place) for place in places]
 
-    def _agrees(self, place: int | None, wanted: Sequence[Any]) -> bool:
-        return self.posed.agree(part_of(self.answered, place), part_of(wanted, place))
+    @property
+    def share(self) -> float:
+        """Of its results that are right."""
+        return sum(case.right for case in self.cases) / len(self.cases)
 
     def description(self) -> tuple[str, list[str], bool]:
         """What to say, the names of the mistakes it looks like, and whether that explains the first
         result that is wrong."""
-        parts = self.parts
-        right = [part for part, good in zip(parts, self.right, strict=True) if good]
+        right = [case.name for case in self.cases if case.right]
+        wrong = [case for case in self.cases if not case.right]
         start = f"{', '.join(right)} right, the rest not. " if right else "not right. "
-        if whole := [mistake for mistake, wrong in self.posed.known if self._agrees(None, wrong)]:
+        agree = self.posed.agree
+        if whole := [mistake for mistake, would in self.posed.known if agree(self.answered, would)]:
             lead = _lead(whole)
             return start + lead.says, lead.names, True
         if self._swapped():
             return "not right. All results are right, but in another order.", ["swapped"], True
-        wrong = [place for place, good in enumerate(self.right) if not good] if parts else [None]
-        known = {place: _lead(seen) for place in wrong if (seen := self._mistakes(place))}
+        known = {case.name: _lead(seen) for case in wrong if (seen := self._mistakes(case))}
         leads = known
-        for place in wrong:
-            if not leads and (hint := general(Case(self.posed, self.answer, self.answered, place))):
-                leads = {place: Lead([hint[0]], hint[1])}
+        for case in wrong:
+            if not leads and (hint := general(case)):
+                leads = {case.name: Lead([hint[0]], hint[1])}
         if not leads:
             return start + GENERAL, [], False
         names = list(dict.fromkeys(name for lead in leads.values() for name in lead.names))
-        if not parts:
-            return start + leads[None].says, names, True
-        called = dict[int | None, str](enumerate(parts))
-        first, hints = wrong[0], dict[str, list[str]]()
-        for place, lead in leads.items():
+        first, hints = wrong[0].name, dict[str, list[str]]()
+        if not first:  # the only result
+            return start + leads[first].says, names, True
+        for part, lead in leads.items():
             # its formula may be right, on a wrong result
             follows = known and not set(lead.names) & set(leads.get(first, Lead([], "")).names)
-            says = lead.says + f" Or: it follows from {called[first]}." * bool(follows)
-            hints.setdefault(says, []).append(called[place])
+            says = lead.says + f" Or: it follows from {first}." * bool(follows)
+            hints.setdefault(says, []).append(part)
         says = " ".join(f"{', '.join(where)}: {hint}" for hint, where in hints.items())
         if first not in leads and not known:  # what there is a hint of may follow from it
-            return f"{start}{called[first]} is wrong too: start there. {says}", names, False
-        if rest := [called[place] for place in wrong if place not in leads]:
+            return f"{start}{first} is wrong too: start there. {says}", names, False
+        if rest := [case.name for case in wrong if case.name not in leads]:
             says += f" {', '.join(rest)} may be wrong for the same reason."
         return start + says, names, True
 
@@ -92,49 +90,43 @@ class Wrong:
             self.posed.agree(
                 [tuple(result[i] for i in order) for result in self.answered], self.posed.expected
             )
-            for order in permutations(range(len(self.parts)))
+            for order in permutations(range(len(self.posed.question.parts)))
             if list(order) != sorted(order)
         )
 
-    def _mistakes(self, place: int | None) -> list[Mistake]:
+    def _mistakes(self, case: Case) -> list[Mistake]:
         """Known mistakes that one result looks like: of all, those that spoil the fewest results
         that are right; of these, those that explain the most of the wrong ones."""
         agree, known = self.posed.agree, self.posed.known
-        seen = [(mistake, wrong) for mistake, wrong in known if self._agrees(place, wrong)]
-        mine, theirs = part_of(self.answered, place), part_of(self.posed.expected, place)
-        good = [agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
+        seen = [(mistake, would) for mistake, would in known if case.given(would)]
+        good = [agree([a], [b]) for a, b in case.pairs]
         first = good.index(False)
-        if not seen and isinstance(theirs[first], np.ndarray) and theirs[first].size >= MANY:
+        if not seen and case.numeric and case.expected[first].size >= MANY:
             # as in the first call that is wrong: more may be, later
-            wanted = [i for i, right in enumerate(good) if right or i == first]
-            seen = [
-                (mistake, wrong)
-                for mistake, wrong in known
-                if agree([mine[i] for i in wanted], [part_of(wrong, place)[i] for i in wanted])
-            ]
-        ranks = [self._rank(wrong) for _, wrong in seen]
+            calls = [i for i, right in enumerate(good) if right or i == first]
+            seen = [(mistake, would) for mistake, would in known if case.given(would, calls)]
+        ranks = [self._rank(would) for _, would in seen]
         return [
             mistake for (mistake, _), rank in zip(seen, ranks, strict=True) if rank == max(ranks)
         ]
 
-    def _rank(self, wrong: Sequence[Any]) -> tuple[int, int]:
-        fits = [self._agrees(place, wrong) for place in range(len(self.parts))]
-        return sum(fit and right for fit, right in zip(fits, self.right, strict=True)), sum(fits)
+    def _rank(self, would: Sequence[Any]) -> tuple[int, int]:
+        fits = [case for case in self.cases if case.given(would)]
+        return sum(case.right for case in fits), len(fits)
 
     def example(self) -> str:
         """One input for which the answer is wrong, and what it gives there."""
-        posed = self.posed
-        wrong = [
-            call
-            for call, pair in enumerate(zip(self.answered, posed.expected, strict=True))
-            if not posed.agree(*([side] for side in pair))
-        ]
-        call = min(wrong, key=lambda call: sum(map(np.size, posed.arguments[call])))
-        mine, right = self.answered[call], posed.expected[call]
-        for part, own, wanted in zip(self.parts, mine, right, strict=True) if self.parts else ():
-            if not posed.agree([own], [wanted]):
-                return shown(posed, call, own, wanted, part)
-        return shown(posed, call, mine, right, "")
+        agree, sizes = self.posed.agree, [sum(map(np.size, v)) for v in self.posed.arguments]
+        _, call, case = min(
+            (
+                (sizes[call], call, case)
+                for case in self.cases
+                for call, (mine, right) in enumerate(case.pairs)
+                if not agree([mine], [right])
+            ),
+            key=lambda wrong: wrong[:2],
+        )
+        return shown(self.posed, call, *case.pairs[call], case.name)
 
 
 def _lead(mistakes: Sequence[Mistake]) -> Lead:

@@ -124,10 +124,10 @@ def _names(code: CodeType) -> list[str]:
 
 
 OPERATORS: dict[type, tuple[str, type[ast.operator]]] = {
-    ast.Add: ("inner-sign", ast.Sub),
-    ast.Sub: ("inner-sign", ast.Add),
-    ast.Mult: ("quotient", ast.Div),
-    ast.Div: ("quotient", ast.Mult),
+    ast.Add: ("one-sign-wrong", ast.Sub),
+    ast.Sub: ("one-sign-wrong", ast.Add),
+    ast.Mult: ("product-for-quotient", ast.Div),
+    ast.Div: ("product-for-quotient", ast.Mult),
 }
 LOST = {
     ast.Add: "term-lost",
@@ -144,13 +144,13 @@ def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast
     another."""
     match node:
         case ast.Name(id=own) if own in names:
-            yield from (("letter", ast.Name(name)) for name in names if name != own)
+            yield from (("other-letter", ast.Name(name)) for name in names if name != own)
         case ast.BinOp(left=left, op=op, right=right):
             if type(op) in OPERATORS:
                 kind, opposite = OPERATORS[type(op)]
                 yield kind, ast.BinOp(left, opposite(), right)
             if isinstance(op, ast.MatMult):
-                yield "order", ast.BinOp(right, op, left)
+                yield "other-order", ast.BinOp(right, op, left)
             lost = LOST.get(type(op), "")
             if lost:
                 yield lost, left
@@ -161,16 +161,16 @@ def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast
             if isinstance(op, ast.Div):
                 yield lost, ast.BinOp(ast.Constant(1), op, right)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            yield "inner-sign", operand
+            yield "one-sign-wrong", operand
         case ast.Attribute(value=value, attr="T"):
-            yield "order", value
+            yield "other-order", value
         case ast.Call(func=function, args=[first, second], keywords=[]):
-            yield "order", ast.Call(function, [second, first], [])
+            yield "other-order", ast.Call(function, [second, first], [])
         case ast.Call(args=[only], keywords=[]) if not isinstance(only, ast.Starred):
             yield "function-lost", only
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             for other in (value + 1, value - 1, 2 * value):
-                yield "number", ast.Constant(other)
+                yield "other-number", ast.Constant(other)
 
 
 def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:

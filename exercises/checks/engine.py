@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 OURS = Path(kfcourse.__file__).resolve().parent, Path(__file__).resolve().parents[1]
 SECONDS = 20.0  # an answer may take
 DIAGNOSIS = 60.0  # the search for the kind of mistake
+FOLLOWS = "right-on-top-of-an-earlier-wrong-answer"
 
 
 class Missing(Exception):
@@ -250,18 +251,17 @@ class _Check:
     def _wrong(self, answered: list[Any]) -> Result:
         times, follows = self._times(answered), self._follows(answered)
         wrong = Wrong(self.posed, self.answer, answered)
-        share = sum(wrong.right) / len(wrong.right) if wrong.right else 0.0
         if follows:
             says = (
                 f"this step is right on top of your {' and '.join(follows)}; what is not right "
                 f"yet is there: look there first."
             )
-            return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
+            return self._says(WRONG, says, diagnosis=(FOLLOWS,), share=wrong.share, follows=follows)
         message, names, explained = wrong.description()
         advice = self.question.advice if times else ""
         example = not explained or times > bool(self.question.advice)
         message = " ".join(filter(None, [message, advice, wrong.example() if example else ""]))
-        return self._says(WRONG, message, diagnosis=tuple(names), share=share)
+        return self._says(WRONG, message, diagnosis=tuple(names), share=wrong.share)
 
     def _times(self, answered: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""

@@ -46,20 +46,21 @@ def root(value: Any) -> Any:
 
 
 INVERSE = "It looks like the inverse of what it should be."
+# A name says what is wrong, with spaces for hyphens: overviews of a course count them.
 OF_RESULT: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
-    ("sign", "The size is right, the sign is not.", lambda v: -v),
+    ("wrong-sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", transposed),
     (
-        "root",
+        "root-of-it",
         "It is the square root of what it should be, as a standard deviation is of a variance.",
         lambda v: each(v, root),
     ),
-    ("factor-2", "It is half of what it should be.", lambda v: v / 2),
-    ("factor-half", "It is twice what it should be.", lambda v: 2 * v),
+    ("half-of-it", "It is half of what it should be.", lambda v: v / 2),
+    ("twice-of-it", "It is twice what it should be.", lambda v: 2 * v),
     ("inverse", INVERSE, lambda v: each(v, lambda entry: 1 / entry)),
     ("inverse", INVERSE, np.linalg.inv),
     (
-        "square",
+        "square-of-it",
         "It is the square of what it should be, as a variance is of a standard deviation.",
         lambda v: each(v, lambda entry: entry**2),
     ),
@@ -73,13 +74,13 @@ def results(case: Case) -> Iterator[Row]:
     mine, right = (set().union(*map(symbols, side)) for side in (case.answered, case.expected))
     if {s.name for s in values} & right - mine:
         yield (
-            "numbers",
+            "numbers-for-symbols",
             "Right in numbers, but the parameters are asked for as symbols: type their letters "
             "where their values stand.",
             partial(applied, lambda formula: with_values(formula, values), case.expected),
         )
     yield (
-        "vanishing",
+        "is-zero",
         "It is zero: is that what is left when all cancels, or is something multiplied by zero?",
         partial(applied, nothing, case.answered, case.expected),
     )
@@ -88,7 +89,7 @@ def results(case: Case) -> Iterator[Row]:
     for decimals in range(1, 9) if case.numeric else ():
         rounded = partial(np.round, decimals=decimals)
         yield (
-            "precision",
+            "low-precision",
             "It is rounded: hand in all digits.",
             partial(applied, rounded, case.expected),
         )
@@ -102,7 +103,7 @@ def results(case: Case) -> Iterator[Row]:
         given = [values[place] for values in case.posed.arguments]
         if all(isinstance(value, np.ndarray) for value in given):
             yield (
-                "unchanged",
+                "argument-unchanged",
                 f"That is the argument `{name}`, unchanged.",
                 partial(applied, np.nan_to_num, given),
             )
@@ -125,7 +126,7 @@ def arguments(case: Case) -> Iterator[Row]:
             order = [*range(len(names))]
             order[i], order[j] = j, i
             exchanged = [[values[k] for k in order] for values in calls]
-            yield "exchanged", says, partial(instead, case, case.posed.key, exchanged)
+            yield "arguments-exchanged", says, partial(instead, case, case.posed.key, exchanged)
     known = [
         (f"the argument `{name}`", [values[i] for values in calls]) for i, name in enumerate(names)
     ]
@@ -134,7 +135,7 @@ def arguments(case: Case) -> Iterator[Row]:
     for what, values in known:
         if not all(map(partial(fits, numeric=case.numeric), values, case.expected)):
             continue
-        for name, of, change in (
+        for kind, of, change in (
             ("term", "", lambda b, v: b - v),
             ("term", "", lambda b, v: b + v),
             ("factor", "", lambda b, v: b / v),
@@ -142,21 +143,21 @@ def arguments(case: Case) -> Iterator[Row]:
             ("factor", "the square of ", lambda b, v: b / v**2),
             ("factor", "the square of ", lambda b, v: b * v**2),
         ):
-            much = "added, or forgotten" if name == "term" else "too many, or forgotten"
-            says = f"It is right but for a {name} that is {of}{what}: {much}?"
-            yield name, says, partial(applied, change, case.expected, values)
+            much = "added, or forgotten" if kind == "term" else "too many, or forgotten"
+            says = f"It is right but for a {kind} that is {of}{what}: {much}?"
+            yield f"wrong-{kind}", says, partial(applied, change, case.expected, values)
 
 
 SLIPS = {
-    "inner-sign": "with one sign changed: a plus for a minus, or the other way",
-    "order": "with something not transposed, or two things in another order",
+    "one-sign-wrong": "with one sign changed: a plus for a minus, or the other way",
+    "other-order": "with something not transposed, or two things in another order",
     "term-lost": "with one term left out",
     "factor-lost": "with one multiplication, or division, left out",
-    "quotient": "with a product in the place of a quotient, or the other way",
+    "product-for-quotient": "with a product in the place of a quotient, or the other way",
     "power-lost": "with a power left out",
     "function-lost": "with a function, such as a root, left out",
-    "number": "with another number, index or axis somewhere",
-    "letter": "with one letter in the place of another",
+    "other-number": "with another number, index or axis somewhere",
+    "other-letter": "with one letter in the place of another",
 }
 
 
@@ -226,7 +227,7 @@ def rough(case: Case) -> Said | None:
     if not case.numeric or not all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
         return None
     return (
-        "precision",
+        "low-precision",
         "It is nearly right: is something rounded, or computed in single precision (float32), or "
         "something small left out, added or divided otherwise?",
     )
@@ -240,12 +241,12 @@ def sometimes(case: Case) -> Said | None:
     sizes = [np.size(b) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs if case.numeric]
     if len(set(sizes)) > 1 and [size == 1 for size in sizes] == right:
         return (
-            "scalars-only",
+            "right-for-scalars-only",
             "It is right for scalars only: look at the order of the matrices, at what is "
             "transposed, and at what is done entry by entry or over all axes at once.",
         )
     return (
-        "sometimes",
+        "right-for-some-inputs",
         f"It is right for {sum(right)} of {len(right)} hidden inputs: a case is left out, or it "
         f"holds for a special one only.",
     )
@@ -262,14 +263,14 @@ def first_step(case: Case) -> Said | None:
     ]
     if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs) and 2 * sum(later) > len(later):
         return (
-            "from-second-step",
+            "wrong-from-second-step",
             "The first step is right, later ones are not: what is handed on from one step to the "
             "next?",
         )
     after, before = slice(1, None), slice(None, -1)
     for mine, right, word in ((after, before, "late"), (before, after, "early")):
         if case.agree([a[mine] for a in case.answered], [b[right] for b in case.expected]):
-            return "shifted", f"The values are right, but each stands one step too {word}."
+            return "one-step-off", f"The values are right, but each stands one step too {word}."
     return None
 
 
@@ -277,19 +278,19 @@ def factor_or_term(case: Case) -> Said | None:
     """A factor that is the same everywhere, or a term for all that a call gives."""
     if not case.numeric:
         ((mine, *more), (right, *_)) = case.formulas
-        for name, rest in (("factor", mine / right), ("term", mine - right)):
+        for kind, rest in (("factor", mine / right), ("term", mine - right)):
             on = depends(rest)
             if not more and on < depends(right) and len(on) < 2:
                 which = f"depends on {on.pop()} only" if on else "is a number"
-                return name, f"It is right but for a {name} that {which}."
+                return f"wrong-{kind}", f"It is right but for a {kind} that {which}."
         return None
     if all(b.size > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
-        return "term", "It is right but for a term that is one number for the whole result."
+        return "wrong-term", "It is right but for a term that is one number for the whole result."
     a, b = case.numbers
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)
         if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
-            return "factor", "It is right but for a factor that is the same everywhere."
+            return "wrong-factor", "It is right but for a factor that is the same everywhere."
     return None
 
 
@@ -316,7 +317,8 @@ def entries(case: Case) -> Said | None:
         else f"component {place[0] + 1}"
         for place in wrong
     ]
-    return "entries", f"Only {' and '.join(names)} {'is' if len(names) == 1 else 'are'} wrong."
+    verb = "is" if len(names) == 1 else "are"
+    return "some-entries-wrong", f"Only {' and '.join(names)} {verb} wrong."
 
 
 def improper(case: Case) -> Said | None:
@@ -368,8 +370,10 @@ def unused(case: Case) -> Said | None:
     if missing:
         which = ", ".join(map(form.format, missing))
         what = "forgotten, or cancelled, or is something of the notebook used instead?"
-        return "unused", f"It does not depend on {which} and should: {what}"
-    return ("superfluous", f"It depends on {', '.join(extra)} and should not.") if extra else None
+        return "argument-unused", f"It does not depend on {which} and should: {what}"
+    if extra:
+        return "symbol-superfluous", f"It depends on {', '.join(extra)} and should not."
+    return None
 
 
 def multiplied(case: Case, factor: sp.Rational) -> Iterator[str]:
@@ -402,7 +406,7 @@ def limit(case: Case) -> Said | None:
     if not where:
         return None
     part = f"look at the part that {'this' if len(where) == 1 else 'each of these'} brings in"
-    return "limit", f"It is right where {' or '.join(where[:3])} is zero: {part}."
+    return "one-part-wrong", f"It is right where {' or '.join(where[:3])} is zero: {part}."
 
 
 def terms(case: Case) -> Said | None:
@@ -413,12 +417,15 @@ def terms(case: Case) -> Said | None:
     if not mine & theirs or len(mine) > 12:
         return None
     if theirs < mine:
-        return "terms", "All terms that belong there are there, and something else besides."
+        return (
+            "some-terms-wrong",
+            "All terms that belong there are there, and something else besides.",
+        )
     right = ", ".join(sorted(map(str, mine & theirs)))
     # which may be right in another form, in part
     more = "another is missing" if mine < theirs else "look at the rest"
     return (
-        "terms",
+        "some-terms-wrong",
         f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} "
         f"right; {more}.",
     )

@@ -61,11 +61,6 @@ class Mistake:
         return answer_for(exercise, self.wrong)
 
 
-def catalogue(rows: Sequence[tuple[str, str, Answer]]) -> tuple[Mistake, ...]:
-    """Mistakes from rows of name, says, wrong."""
-    return tuple(Mistake(*row) for row in rows)
-
-
 @dataclass(frozen=True)
 class Question:
     """A question of an exercise set.

@@ -17,7 +17,15 @@ from functools import cached_property
 import numpy as np
 import sympy as sp
 
-from kfcourse.exercises.derivations.terms import Node, difference, letter, mean, power, product
+from kfcourse.exercises.derivations.terms import (
+    Node,
+    difference,
+    letter,
+    letters,
+    mean,
+    power,
+    product,
+)
 from kfcourse.exercises.derivations.typed import tree_of
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
@@ -121,6 +129,16 @@ class Setting:
     def at(self, mean_name: str, cov_name: str) -> Setting:
         """The same for a law x ~ N(mean, covariance) with these letters."""
         return with_functions(replace(self, law=self.law.at(mean_name, cov_name)))
+
+    def opened(self, *trees: Node, closed: str = "") -> set[str]:
+        """Letters of trees, and of all that these letters mean; but of what one of them means."""
+        seen: set[str] = set()
+        waiting = list(trees)
+        while waiting:
+            new = letters(waiting.pop()) - seen
+            seen |= new
+            waiting += [self.meanings[name] for name in new - {closed} if name in self.meanings]
+        return seen
 
     def defining(self, name: str, tree: Node) -> Setting:
         """The same where a name stands for what was derived."""

@@ -130,14 +130,9 @@ class _Search:
     values: Values = field(init=False)
 
     def __post_init__(self) -> None:
-        free, waiting = set(self.setting.law.letters), [self.line, self.above]
-        while waiting:
-            for name in letters(waiting.pop()) - free:
-                free.add(name)
-                if name in self.setting.meanings:
-                    waiting.append(self.setting.meanings[name])
-        self.pool = sorted(free)
         both = [self.line, self.above]
+        free = {*self.setting.law.letters, *self.setting.opened(*both)}
+        self.pool = sorted(free)
         self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
         self.mine, self.theirs = (self.values.of(tree, keep=True) for tree in both)
         self.terms = [

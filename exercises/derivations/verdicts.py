@@ -6,15 +6,14 @@ on top of it, or wrong in itself; or it is right in itself, equal to what stood 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from kfcourse.exercises.derivations.chains import Chain, FindModel, Typed, read_chains
 from kfcourse.exercises.derivations.setting import Law, Setting, of_side
 from kfcourse.exercises.derivations.slips import find_slips, named
-from kfcourse.exercises.derivations.terms import LETTER, Node, at, letter, walk
+from kfcourse.exercises.derivations.terms import Node, at, letter
 from kfcourse.exercises.derivations.values import (
-    DIFFERENT,
     EQUAL,
     IF_POSITIVE,
     NO_VALUE,
@@ -55,10 +54,8 @@ class Verdict:
     kinds : tuple of str
         Of slips that explain a line that differs; more than one only if two explain it equally
         well.
-    terms : tuple of str
-        The terms that they name.
     spans : tuple of pairs
-        Where these stand in the text; none for a term of the line above.
+        Where the terms stand in the text that they name; none for a term of the line above.
     rule : str
         Which the right step uses.
     tree : Node, optional
@@ -71,7 +68,6 @@ class Verdict:
     status: str
     says: str = ""
     kinds: tuple[str, ...] = ()
-    terms: tuple[str, ...] = ()
     spans: tuple[tuple[int, int], ...] = ()
     rule: str = ""
     tree: Node | None = None
@@ -156,37 +152,41 @@ def check_text(text: str, find: FindModel | None, setting: Setting | None = None
     """
     derived: dict[str, tuple[Law, Node]] = {}
     return Report(
-        tuple(_Chain(chain, derived).checked() for chain in read_chains(text, find, setting))
+        tuple(_Checking(chain, derived).checked() for chain in read_chains(text, find, setting))
     )
 
 
-@dataclass
-class _Chain:
-    chain: Chain
-    derived: dict[str, tuple[Law, Node]]  # by name, with the law whose letters it has
-    verdicts: list[Verdict] = field(default_factory=list)
+class _Checking:
+    """A chain while it is checked, with what was derived before it, by name, and the law whose
+    letters that has.
+
+    previous, above : the line above, or what the name means, and as it was typed
+    right : the last line that is right
+    broken : number of the line with the first slip, after which nothing was right in itself, or 0
+    """
+
+    def __init__(self, chain: Chain, derived: dict[str, tuple[Law, Node]]):
+        first, *rest = chain.links
+        self.derived = derived
+        self.name = first.text if first.text.isidentifier() else ""
+        self.links = rest if self.name else chain.links
+        self.setting = of_side(chain.setting, self.name)
+        for name, (law, tree) in derived.items():
+            if law == self.setting.law and name != self.name:
+                self.setting = self.setting.defining(name, tree)
+        meant = self.name in self.setting.meanings
+        self.previous = self.right = letter(self.name) if meant else None
+        self.above, self.broken = "" if self.name else first.text, 0
+        self.verdicts: list[Verdict] = []
 
     def checked(self) -> Derived:
-        first, *rest = self.chain.links
-        name = first.text if first.text.isidentifier() else ""
-        self.setting = of_side(self.chain.setting, name)
-        for letter_, (law, tree) in self.derived.items():
-            if law == self.setting.law and letter_ != name:
-                self.setting = self.setting.defining(letter_, tree)
-        meant = name in self.setting.meanings
-        previous: Node | None = letter(name) if meant else None
-        above = "" if name else first.text
-        links = iter(rest if name else self.chain.links)
-        self.right: Node | None = previous  # the last line that is right
-        # number of the line with the first slip, after which nothing was right in itself
-        broken = 0
-        for link in links:
+        """The verdicts; what the chain derives is added."""
+        for link in self.links:
             node = None
-            defined = name if previous is not None and not above else ""
             try:
                 with time_limit(SECONDS):
                     node = link.read(self.setting)
-                    broken = self._line(link, node, previous, above, defined, broken)
+                    self._judge(link, node)
             except FormulaError as error:
                 self._says(link, UNREADABLE, _marked(link, error))
                 continue
@@ -194,30 +194,12 @@ class _Chain:
                 late = f"it cannot be compared within {SECONDS:g} s: split the step up"
                 self._says(link, UNDECIDED, str(error) or late, node)
                 continue
-            previous, above = node, link.text
-        if (
-            name
-            and previous is not None
-            and name not in self.setting.law.letters
-            and not self._comes_back(name, previous)
-        ):
-            self.derived[name] = self.setting.law, previous
-        return Derived(name, tuple(self.verdicts))
-
-    def _comes_back(self, name: str, tree: Node) -> bool:
-        """Whether what stands for a name has the name in it again, as the letters mean here:
-        nothing is derived in a circle."""
-        seen: set[str] = set()
-        waiting = [tree]
-        while waiting:
-            new = {inner.data for _, inner in walk(waiting.pop()) if inner.kind == LETTER} - seen
-            seen |= new
-            waiting += [
-                self.setting.meanings[letter_]
-                for letter_ in new
-                if letter_ != name and letter_ in self.setting.meanings
-            ]
-        return name in seen
+            self.previous, self.above = node, link.text
+        end, taken = self.previous, {"", *self.setting.law.letters}
+        # nothing is derived in a circle
+        if end and self.name not in taken | self.setting.opened(end, closed=self.name):
+            self.derived[self.name] = self.setting.law, end
+        return Derived(self.name, tuple(self.verdicts))
 
     def _says(
         self, link: Typed, status: str, says: str = "", tree: Node | None = None, **more: Any
@@ -225,28 +207,31 @@ class _Chain:
         place = link.line, link.column, link.text
         self.verdicts.append(Verdict(*place, status, says, tree=tree, **more))
 
-    def _line(
-        self, link: Typed, node: Node, previous: Node | None, above: str, name: str, broken: int
-    ) -> int:
-        """Judge one line; returns the number of the line with the slip on which it stands, or 0."""
-        if previous is None:
+    def _judge(self, link: Typed, node: Node) -> None:
+        """Judge one line."""
+        if self.previous is None:
             compare(self.setting, node, node)  # a mean that is not computed is said here
             says = "nothing to compare it with: the chain is checked from here"
             self._says(link, BEGINS, says, node)
             self.right = node
-            return 0
-        result = compare(self.setting, node, previous)
-        if result == EQUAL:
-            if not broken:
-                self._says(link, RIGHT, tree=node)
-                self.right = node
-            else:
-                self._says(link, FOLLOWS, f"right on top of line {broken}", node)
-            return broken
-        if broken and self.right is not None and compare(self.setting, node, self.right) == EQUAL:
-            says = f"right in itself: equal to what stood before the slip of line {broken}"
+            return
+        result = compare(self.setting, node, self.previous)
+        if result == EQUAL and not self.broken:
+            self._says(link, RIGHT, tree=node)
+            self.right = node
+        elif result == EQUAL:
+            self._says(link, FOLLOWS, f"right on top of line {self.broken}", node)
+        elif self.broken and self.right and compare(self.setting, node, self.right) == EQUAL:
+            says = f"right in itself: equal to what stood before the slip of line {self.broken}"
             self._says(link, AGAIN, says, node)
-            return 0
+            self.broken = 0
+        else:
+            self._differs(link, node, self.previous, result)
+            self.broken = self.broken or link.line
+
+    def _differs(self, link: Typed, node: Node, previous: Node, result: str) -> None:
+        """Say how a line differs."""
+        name = "" if self.above else self.name
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
             raise Uncomputed(
@@ -260,29 +245,21 @@ class _Chain:
                 f"own before the chain, positive ..."
             )
             self._says(link, DIFFERS, says, node, kinds=("positive",))
-            return broken or link.line
-        slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
-        descriptions = [
-            described(self.setting, slip, link.text, node, above, previous) for slip in slips
-        ]
-        words = " or ".join(words for words, _ in descriptions)
-        places = [at(node, named(node, slip.path)).span for slip in slips if not slip.above]
-        says = (
-            f"the line differs from {where}: {words}"
-            if descriptions
-            else UNEXPLAINED.format(above=where)
+            return
+        slips = find_slips(self.setting, node, previous)
+        words = " or ".join(
+            described(self.setting, slip, link.text, node, self.above, previous) for slip in slips
         )
+        places = [at(node, named(node, slip.path)).span for slip in slips if not slip.above]
         self._says(
             link,
             DIFFERS,
-            says,
+            f"the line differs from {where}: {words}" if words else UNEXPLAINED.format(above=where),
             node,
             kinds=tuple(slip.kind for slip in slips),
-            terms=tuple(term for _, term in descriptions),
             spans=tuple(place for place in places if place),
             rule=rule(self.setting, slips[0] if slips else None, node, previous, name),
         )
-        return broken or link.line
 
 
 def _marked(link: Typed, error: FormulaError) -> str:

@@ -3,6 +3,10 @@ would be right."""
 
 from __future__ import annotations
 
+import re
+
+from markupsafe import Markup, escape
+
 from kfcourse.exercises.derivations.setting import Setting
 from kfcourse.exercises.derivations.slips import Slip, named, term_path
 from kfcourse.exercises.derivations.terms import (
@@ -57,6 +61,11 @@ UNEXPLAINED = (
 )
 
 
+def coded(text: str) -> Markup:
+    """A text in HTML: what stands in backquotes is code."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
 def shown(text: str, node: Node) -> str:
     """The term as it was typed."""
     return text[slice(*node.span)] if node.span else written(node)
@@ -64,8 +73,8 @@ def shown(text: str, node: Node) -> str:
 
 def described(
     setting: Setting, slip: Slip, text: str, line: Node, text_above: str, above: Node
-) -> tuple[str, str]:
-    """What to say of a slip, and the term that is named.
+) -> str:
+    """What to say of a slip.
 
     `text_above` is empty if nothing that the student typed stands above: then nothing of it is
     quoted.
@@ -73,7 +82,7 @@ def described(
     if slip.above:
         term = shown(text_above, at(above, named(above, slip.path))) if text_above else ""
         where = f"`{term}` of the line above" if term else "a term of the definition"
-        return f"what has been made of {where} is not right{_moment(slip)}", term
+        return f"what has been made of {where} is not right{_moment(slip)}"
     place = named(line, slip.path)
     term = shown(text, at(line, place))
     of = "the sign of" if place == term_path(line, slip.path) else "a sign in"
@@ -91,7 +100,7 @@ def described(
         "extra": f"{'something in ' if slip.name else ''}`{term}` does not belong there",
         "lost": f"a term is lost{_lost(slip, text_above)}, in `{term}`",
     }
-    return says[slip.kind], term
+    return says[slip.kind]
 
 
 def _moment(slip: Slip) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import secrets
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -72,13 +71,13 @@ def grade_folder(
     salt, protection = seed or secrets.token_hex(8), ["nothing was run"]
 
     def run(new: Sequence[Returned]) -> Iterator[Grade]:
-        with pool.place(folder, masters, kind) as site:
-            problem = "" if kind == "none" else _problem(site)
+        with pool.place(folder, masters, kind) as box:
+            problem = "" if kind == "none" else sandbox.problem(box)
             if problem or kind == "none":
                 _warn(problem)
-                site = site._replace(sandbox=replace(site.sandbox, kind="none"))
-            protection[:] = [PROTECTION[site.sandbox.kind]]
-            yield from pool.graded(new, Setting(site, salt), workers)
+                box = replace(box, kind="none")
+            protection[:] = [PROTECTION[box.kind]]
+            yield from pool.graded(new, Setting(box, salt), workers)
 
     grades, old = grade_all(work, table, again, run)
     _show(grades)
@@ -95,11 +94,6 @@ def grade_folder(
         for letter, names in same_code(persons):
             click.echo(f"set {letter}: the same code came from {clean(', '.join(names))}")
     return all(grade.status not in (FAILED, PARTLY) for grade in grades)
-
-
-def _problem(site: pool.Site) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        return sandbox.problem(Path(folder).resolve(), site.stage)
 
 
 def _warn(problem: str) -> None:

@@ -14,7 +14,7 @@ import io
 import re
 import tokenize
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from nbformat import NotebookNode
@@ -32,7 +32,6 @@ from kfcourse.exercises.grading.results import (
     NOT_RUN,
     OTHER,
     PARTLY,
-    Comment,
     Grade,
     in_words,
 )
@@ -42,11 +41,9 @@ from kfcourse.exercises.grading.running import (
     Answer,
     Kernel,
     Killed,
-    Opening,
-    Site,
     Stopped,
 )
-from kfcourse.exercises.grading.staging import personal_numbers
+from kfcourse.exercises.grading.sandbox import Sandbox
 from kfcourse.exercises.grading.submissions import (
     EXPORT,
     Cell,
@@ -72,12 +69,12 @@ class Setting:
 
     Attributes
     ----------
-    place : Site
+    place : Sandbox
     salt : str
         Of the hidden arguments.
     """
 
-    place: Site
+    place: Sandbox
     salt: str
 
 
@@ -120,27 +117,22 @@ def _grade(
     with time_limit(WHOLE * work.seconds):
         exercise, looks = claimed(claim, work.variants_file, work.variant)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
-        opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise))
+        starting = start(setting.place, exercise, work.seconds)
     steps, own = assembled(master, cells)
     marking = Marking(exercise, setting.salt, lost(master, cells))
-    with start(setting.place, opening, work.seconds) as kernel:
+    with starting as kernel:
         marking.run(kernel, steps)
     functions = {question.function for question in exercise.questions.values()}
-    comments = {
-        name: Comment(result.message, result.diagnosis, result.share, result.follows)
-        for name, result in marking.results.items()
-    }
-    status, digest = (PARTLY, "") if NOT_GRADED in marking.marks.values() else (GRADED, work.digest)
+    partly = any(result.status == NOT_GRADED for result in marking.results.values())
     return Grade(
         work.name,
-        status,
+        PARTLY if partly else GRADED,
         exercise.letter,
         exercise.variant.name,
-        marking.marks,
+        marking.results,
         tuple(dict.fromkeys([*marking.notes, *marking.errors[:2], *marking.reasons()])),
         tuple(dict.fromkeys([*looks, *marking.looks(), *strange_lines(own, master)])),
-        digest,
-        comments,
+        "" if partly else work.digest,
         clean(str(claim.get("student", ""))) if isinstance(claim, dict) else "",
         code_of(own, functions),
     )
@@ -167,10 +159,8 @@ class Marking:
 
     Attributes
     ----------
-    marks : dict
-        Question to mark.
     results : dict
-        Question to what the check said.
+        Question to what the check said, or why nothing was asked.
     notes : list of str
         Where the notebook stopped, if it did, and which answers are gone from it.
     errors : list of str
@@ -183,8 +173,9 @@ class Marking:
         self._gone = {
             named[function]: fate for function, fate in (gone or {}).items() if function in named
         }
-        self.marks = dict.fromkeys(exercise.questions, NOT_RUN)
         self.results: dict[str, Result] = {}
+        for name in exercise.questions:
+            self._says(name, NOT_RUN, "not run: is there an error in a cell before it?")
         self.notes = [f"the cell of {name} {fate}" for name, fate in self._gone.items()]
         self.errors: list[str] = []
         self._reasons: dict[str, list[str]] = {}
@@ -197,14 +188,16 @@ class Marking:
             try:
                 ran = kernel.cell(step.source, step.names)
             except Stopped as reason:
-                for name, mark in self.marks.items():
+                why = f"{step.where}: {reason}"
+                waiting = [n for n, result in self.results.items() if result.status == NOT_RUN]
+                for name in waiting:
                     # what would have come is not known
-                    if mark == NOT_RUN and isinstance(reason, Killed):
-                        self._not_graded(name, f"{step.where}: {reason}")
-                    elif mark == NOT_RUN:
-                        self._not_run(name, f"{step.where}: {reason}")
+                    if isinstance(reason, Killed):
+                        self._not_graded(name, why)
+                    else:
+                        self._not_run(name, why)
                 if not isinstance(reason, Killed):
-                    self.notes.append(f"{step.where}: {reason}")
+                    self.notes.append(why)
                 return
             if ran.error and not ran.stub and (step.own or "import " in step.source):
                 self.errors.append(clean(f"{step.where}: {ran.error}"))
@@ -212,7 +205,7 @@ class Marking:
                 if ran.error:
                     self._not_run(name, ran.error)
                     self._reasons.setdefault(ran.error, []).append(name)
-                elif name in ran.answers and name in self.marks:
+                elif name in ran.answers:
                     self._check(name, kernel, ran.answers[name])
 
     def _check(self, name: str, kernel: Kernel, kind: str) -> None:
@@ -237,26 +230,23 @@ class Marking:
                 if gone
                 else f"{result.message}, or stands on what is not there: the cell of {others}"
             )
-            result = Result(name, result.title, MISSING, says)
-        self.results[name], self.marks[name] = result, result.status
+            result = replace(result, message=says)
+        self.results[name] = result
         if result.status == UNUSABLE:
             self._reasons.setdefault(result.message, []).append(name)
         elif result.status == WRONG and result.diagnosis:
             words = (in_words(question, mistake) for mistake in result.diagnosis)
             self._reasons.setdefault(", ".join(words), []).append(name)
 
+    def _says(self, name: str, status: str, message: str) -> None:
+        self.results[name] = Result(name, self._exercise.questions[name].title, status, message)
+
     def _not_run(self, name: str, reason: str) -> None:
         """Say in the student's feedback where the notebook stopped."""
-        if name in self.marks:
-            says = clean(f"not run. {reason}", 300)
-            self.results[name] = Result(name, self._exercise.questions[name].title, NOT_RUN, says)
+        self._says(name, NOT_RUN, clean(f"not run. {reason}", 300))
 
     def _not_graded(self, name: str, reason: str) -> None:
-        title = self._exercise.questions[name].title
-        self.results[name], self.marks[name] = (
-            Result(name, title, NOT_GRADED, LOOKED_AT),
-            NOT_GRADED,
-        )
+        self._says(name, NOT_GRADED, LOOKED_AT)
         self._failed.setdefault(f"not graded: {reason}", []).append(name)
 
     def looks(self) -> list[str]:

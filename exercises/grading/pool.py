@@ -25,7 +25,7 @@ from tqdm import tqdm
 from kfcourse.exercises.grading import marking, sandbox
 from kfcourse.exercises.grading.marking import Setting
 from kfcourse.exercises.grading.results import FAILED, Grade
-from kfcourse.exercises.grading.running import MEMORY, START, WHOLE, Site
+from kfcourse.exercises.grading.running import MEMORY, START, WHOLE
 from kfcourse.exercises.grading.sandbox import Sandbox
 from kfcourse.exercises.grading.staging import answers, stage
 from kfcourse.exercises.grading.submissions import Returned
@@ -94,7 +94,7 @@ def _begin() -> None:
 
 
 @contextmanager
-def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Site]:
+def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Sandbox]:
     """Where notebooks run: a copy of the package without the answers, and the sandbox that hides
     the rest."""
     with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
@@ -105,7 +105,7 @@ def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Site]:
             folder,
             *([masters] if masters else []),
         ]
-        yield Site(staged, Sandbox(kind, tuple(str(path.resolve()) for path in hidden)))
+        yield Sandbox(kind, staged, tuple(str(path.resolve()) for path in hidden))
 
 
 def graded(works: Sequence[Returned], setting: Setting, workers: int) -> Iterator[Grade]:

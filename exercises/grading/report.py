@@ -3,23 +3,21 @@ overview."""
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
-import markupsafe
 
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WEIGHTS, WRONG
+from kfcourse.exercises.derivations.wording import coded
 from kfcourse.exercises.grading.owners import Person, known_sets, people, same_code
 from kfcourse.exercises.grading.results import (
     NOT_GRADED,
     NOT_RUN,
     SIGNS,
-    Comment,
     Grade,
     in_words,
 )
@@ -29,7 +27,6 @@ from kfcourse.exercises.grading.weights import (
     points,
     possible,
     questions,
-    tidy,
     worth,
 )
 from kfcourse.exercises.notebooks.course_list import Student
@@ -130,31 +127,23 @@ def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dic
     commonest first."""
     rows = []
     for name, question in questions(letters).items():
-        marks = (grade.marks.get(name, MISSING) for grade in _grades_of(persons, name))
-        counts = Counter(MISSING if mark == NOT_RUN else mark for mark in marks)
-        counts[MISSING] += len(persons) - counts.total()
-        comments = [
-            grade.comments[name] for grade in _grades_of(persons, name) if name in grade.comments
-        ]
+        grades = (grade for person in persons for grade in person.grades.values())
+        results = [grade.results[name] for grade in grades if name in grade.results]
+        counts = Counter(result.status for result in results)
+        counts[MISSING] += counts[NOT_RUN] + len(persons) - len(results)
         mistakes = Counter(
-            in_words(question, mistake) for comment in comments for mistake in comment.mistakes
+            in_words(question, mistake) for result in results for mistake in result.diagnosis
         ).most_common()
         row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
         row |= {label: counts[mark] for mark, label in KINDS.items()}
         row |= {
-            "in part": sum(0 < comment.share < 1 for comment in comments),
-            "follows": sum(bool(comment.follows) for comment in comments),
+            "in part": sum(0 < result.share < 1 for result in results),
+            "follows": sum(bool(result.follows) for result in results),
         }
         rows.append(
             row | {"mistakes": "; ".join(f"{count}: {mistake}" for mistake, count in mistakes)}
         )
     return rows
-
-
-def _grades_of(persons: Iterable[Person], question: str) -> Iterator[Grade]:
-    return (
-        grade for person in persons for grade in person.grades.values() if question in grade.marks
-    )
 
 
 def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> str:
@@ -163,33 +152,12 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
     parts = []
     for letter in letters:
         grade = person.grades.get(letter)
-        rows = []
-        for question in sets()[letter].questions:
-            mark = grade.marks.get(question.name, NOT_RUN) if grade else NOT_RUN
-            comment = grade.comments.get(question.name) if grade else None
-            says = (
-                (comment or Comment("not run: is there an error in a cell before it?")).says
-                if grade
-                else ""
-            )
-            rows.append(
-                (
-                    question,
-                    mark,
-                    tidy(worth(grade, question, credit)),
-                    WEIGHTS[question.level],
-                    says,
-                )
-            )
-        parts.append(
-            (
-                sets()[letter],
-                grade,
-                rows,
-                points([grade] if grade else [], credit),
-                possible([letter]),
-            )
-        )
+        rows = grade and [
+            (question, grade.results[question.name], worth(grade, question, credit))
+            for question in sets()[letter].questions
+        ]
+        got = points([grade] if grade else [], credit)
+        parts.append((sets()[letter], grade, rows, got, possible([letter])))
     came = list(person.grades.values())
     return _page(
         "feedback",
@@ -198,8 +166,8 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
         levels=[
             (level, points(came, credit, level), possible(letters, level)) for level in WEIGHTS
         ],
-        failed=[(grade.name, grade.note) for grade in person.failed],
         signs=SIGNS,
+        weights=WEIGHTS,
         points=points(came, credit),
         of=possible(letters),
     )
@@ -221,12 +189,11 @@ def overview(
     return _page(
         "overview",
         students=sorted(rows, key=lambda row: (row[0]["group"], row[0]["name"])),
-        flagged=[(person.student.name, person.flags) for person in persons if person.flags],
+        persons=persons,
         same=same_code(persons),
         strangers=strangers,
         letters=letters,
         questions=question_rows(persons, letters),
-        levels=list(WEIGHTS),
         kinds=list(KINDS.values()),
         weights=WEIGHTS,
         credit=credit,
@@ -237,10 +204,5 @@ def overview(
 def _page(name: str, **values: Any) -> str:
     loader = jinja2.PackageLoader("kfcourse.exercises.notebooks")
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
-    environment.filters["coded"] = _coded
+    environment.filters["coded"] = coded
     return environment.get_template(f"{name}.html.j2").render(**values)
-
-
-def _coded(text: str) -> markupsafe.Markup:
-    """What stands in backquotes as code."""
-    return markupsafe.Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(markupsafe.escape(text))))

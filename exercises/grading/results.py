@@ -9,8 +9,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from kfcourse.exercises.checks import Question, sets
-from kfcourse.exercises.checks.hints import OF_RESULT
+from kfcourse.exercises.checks import Question, Result, sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.exercises.notebooks.texts import write_csv
 from kfcourse.files import save
@@ -19,27 +18,6 @@ from kfcourse.files import save
 NOT_RUN, NOT_GRADED = "not run", "not graded"
 GRADED, PARTLY, OTHER, FAILED = "graded", "graded in part", "not an exercise notebook", "not graded"
 SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–", NOT_GRADED: "?"}
-
-
-@dataclass(frozen=True)
-class Comment:
-    """What was said of an answer.
-
-    Attributes
-    ----------
-    says : str
-    mistakes : tuple of str
-        Their names.
-    share : float
-        Of its results that are right.
-    follows : tuple of str
-        The earlier questions on whose wrong answers it is right.
-    """
-
-    says: str
-    mistakes: tuple[str, ...] = ()
-    share: float = 0.0
-    follows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,16 +32,15 @@ class Grade:
         In part, if an answer could not be compared for no fault of its own that is known.
     letter, variant : str
         The set as the notebook claims, the variant by which it was marked.
-    marks : dict
-        Question to "passed", "wrong", "unusable", "not implemented", "not run" or "not graded".
+    results : dict
+        Question to what was said of the answer; its status is a mark: "passed", "wrong",
+        "unusable", "not implemented", "not run" or "not graded".
     notes : tuple of str
         Where it stopped, what the wrong answers look like.
     looks : tuple of str
         What a lecturer should look at.
     digest : str
         Empty if it was not graded, or in part: it is tried again.
-    comments : dict
-        Question to what was said of the answer.
     student : str
         Whom the notebook was handed out to, as it says itself.
     work : str
@@ -74,17 +51,21 @@ class Grade:
     status: str
     letter: str = ""
     variant: str = ""
-    marks: Mapping[str, str] = field(default_factory=dict)
+    results: Mapping[str, Result] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     looks: tuple[str, ...] = ()
     digest: str = ""
-    comments: Mapping[str, Comment] = field(default_factory=dict)
     student: str = ""
     work: str = ""
 
     @property
+    def marks(self) -> dict[str, str]:
+        """Question to mark."""
+        return {name: result.status for name, result in self.results.items()}
+
+    @property
     def passed(self) -> int:
-        return sum(mark == PASSED for mark in self.marks.values())
+        return sum(result.passed for result in self.results.values())
 
     @property
     def note(self) -> str:
@@ -93,11 +74,8 @@ class Grade:
 
 
 def in_words(question: Question, name: str) -> str:
-    """What is said of a known mistake, or of what is known of any result; of others the name tells
-    it."""
-    says = {code: sentence for code, sentence, _ in OF_RESULT}
-    says |= {mistake.name: mistake.says for mistake in question.mistakes}
-    says["follows"] = "right on top of an earlier wrong answer"
+    """What is said of a known mistake; of others the name tells it."""
+    says = {mistake.name: mistake.says for mistake in question.mistakes}
     return says.get(name, name.replace("-", " ")).partition(". ")[0].rstrip(".")
 
 
@@ -113,8 +91,8 @@ def read_lines(path: Path) -> dict[str, Grade]:
         for text in path.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, TypeError, LookupError, AttributeError):
                 fields = json.loads(text)
-                fields["comments"] = {
-                    name: Comment(**_tuples(parts)) for name, parts in fields["comments"].items()
+                fields["results"] = {
+                    name: Result(**_tuples(parts)) for name, parts in fields["results"].items()
                 }
                 if fields["digest"]:
                     grades[fields["digest"]] = Grade(**_tuples(fields))

@@ -4,7 +4,6 @@ and memory."""
 from __future__ import annotations
 
 import os
-import pathlib
 import re
 import secrets
 import shutil
@@ -17,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from kfcourse.exercises.checks import Exercise
 from kfcourse.exercises.checks.engine import Missing
 from kfcourse.exercises.checks.equality import Unusable
 from kfcourse.exercises.grading import sandbox
@@ -25,6 +25,7 @@ from kfcourse.exercises.grading.sandbox import Sandbox
 from kfcourse.exercises.grading.staging import FONTS
 from kfcourse.exercises.grading.submissions import SECONDS
 from kfcourse.exercises.grading.values import ProtocolError, decode, encode
+from kfcourse.exercises.notebooks.master import opened
 from kfcourse.exercises.notebooks.texts import clean
 from kfcourse.limits import OutOfTime
 
@@ -45,15 +46,6 @@ class Killed(Stopped):
     """Its process was killed: whose fault that is nobody knows."""
 
 
-class Opening(NamedTuple):
-    """The exercise as the notebook opens it: its letter, the variant as code, personal numbers by
-    "letter variant"."""
-
-    letter: str
-    variant: str
-    numbers: Mapping[str, Mapping[str, float]]
-
-
 class Ran(NamedTuple):
     """What came of a cell.
 
@@ -67,26 +59,26 @@ class Ran(NamedTuple):
     answers: dict[str, str]
 
 
-class Site(NamedTuple):
-    """Where notebooks run: the package as they see it, and the sandbox."""
-
-    stage: pathlib.Path
-    sandbox: Sandbox
-
-
 class Kernel:
     """A notebook's process.  What it sends are values: nothing of it is believed.
 
     Parameters
     ----------
-    place : Site
-    opening : Opening
+    place : Sandbox
+    exercise : Exercise
+        As it was handed out.
     seconds : float
         Time limit of a cell; all cells may take five times as long.
     """
 
-    def __init__(self, place: Site, opening: Opening, seconds: float = SECONDS):
-        self._place, self._opening, self.seconds = place, opening, seconds
+    def __init__(self, place: Sandbox, exercise: Exercise, seconds: float = SECONDS):
+        self._place, self.seconds = place, seconds
+        self._opening = {
+            "do": "open",
+            "letter": exercise.letter,
+            "opening": opened(exercise),
+            "numbers": {f"{exercise.letter} {exercise.variant.name}": exercise.numbers},
+        }
         self._deadline = float("inf")
         # cells: an answer that is stopped with its process lets the others be asked
         self._done: list[dict[str, Any]] = []
@@ -103,16 +95,13 @@ class Kernel:
     def _start(self) -> None:
         """Start the process, and run the cells that an earlier one has run."""
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        folder, (stage, box) = Path(self._folder.name).resolve(), self._place
+        folder = Path(self._folder.name).resolve()
         command = [sys.executable, "-m", "kfcourse.exercises.grading.session", str(MEMORY)]
-        self._process = box.start(command, folder, stage, environment(folder, stage))
+        self._process = self._place.start(command, folder, environment(folder, self._place.stage))
         assert self._process.stdin and self._process.stdout
         self._channel = PatientChannel(self._process.stdout, self._process.stdin)
-        letter, variant, numbers = self._opening
         try:
-            self._request(
-                {"do": "open", "letter": letter, "opening": variant, "numbers": numbers}, START
-            )
+            self._request(self._opening, START)
         except (Stopped, OutOfTime):
             raise RuntimeError("the process of the notebook does not start") from None
         for message in self._done:
@@ -159,7 +148,7 @@ class Kernel:
         Missing, Unusable, OutOfTime
             As an answer that is called here would make `call` of checks/engine.py say; the last
             with the seconds.
-        Killed
+        Stopped
         """
         functions: list[Callable] = []
 
@@ -181,10 +170,6 @@ class Kernel:
             raise OutOfTime(seconds) from None
         except ProtocolError as reason:
             raise Unusable(f"returns what cannot be read: {clean(str(reason))}") from None
-        except Killed:
-            raise
-        except Stopped as reason:
-            raise Unusable(str(reason)) from None
         fails = reply.get("fails")
         if fails == "missing":
             raise Missing

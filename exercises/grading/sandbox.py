@@ -9,6 +9,7 @@ import site
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -34,21 +35,24 @@ class Sandbox:
     Attributes
     ----------
     kind : {"bwrap", "none"}
+    stage : Path
+        Of the package as notebooks see it.
     hidden : tuple of str
         Folders that no notebook may see in the sandbox: the package with the answers, the returned
         notebooks.
     """
 
     kind: str
+    stage: Path
     hidden: tuple[str, ...] = ()
 
     def start(
-        self, command: Sequence[str], folder: Path, stage: Path, environment: Mapping[str, str]
+        self, command: Sequence[str], folder: Path, environment: Mapping[str, str]
     ) -> subprocess.Popen:
-        """Start a command in `folder`, where it may write; it reads the package in `stage` and
+        """Start a command in `folder`, where it may write; it reads the package on the stage and
         Python's libraries."""
         return subprocess.Popen(
-            [*(self.bubblewrap(folder, stage) if self.kind == "bwrap" else ()), *command],
+            [*(self.bubblewrap(folder) if self.kind == "bwrap" else ()), *command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -57,7 +61,7 @@ class Sandbox:
             start_new_session=True,
         )
 
-    def bubblewrap(self, folder: Path, stage: Path) -> list[str]:
+    def bubblewrap(self, folder: Path) -> list[str]:
         """The beginning of a command that runs in the sandbox."""
         options = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session"]
         options += ["--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
@@ -81,7 +85,7 @@ class Sandbox:
             ):
                 options += ["--tmpfs", place]
         # the package as notebooks see it, whatever was hidden
-        options += ["--ro-bind", str(stage), str(stage)]
+        options += ["--ro-bind", str(self.stage), str(self.stage)]
         return [*options, "--bind", str(folder), str(folder), "--chdir", str(folder)]
 
 
@@ -113,17 +117,12 @@ def end_with_all_below(pid: int) -> None:
                 child.kill()
 
 
-def problem(folder: Path, stage: Path) -> str:
+def problem(box: Sandbox) -> str:
     """Why bubblewrap does not work here; nothing if it does."""
     if not shutil.which("bwrap"):
         return "bubblewrap is not installed (Debian, Ubuntu: apt install bubblewrap)"
-    command = [
-        *Sandbox("bwrap").bubblewrap(folder, stage),
-        sys.executable,
-        "-I",
-        "-c",
-        "import numpy",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True)
+    with tempfile.TemporaryDirectory() as folder:
+        command = [*box.bubblewrap(Path(folder).resolve()), sys.executable, "-I", "-c"]
+        done = subprocess.run([*command, "import numpy"], capture_output=True, text=True)
     words = (done.stderr.strip().splitlines() or ["no message"])[-1][:200]
     return f"bubblewrap does not work here: {words}" if done.returncode else ""

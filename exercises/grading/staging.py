@@ -8,7 +8,7 @@ import shutil
 from importlib import resources
 from pathlib import Path
 
-from kfcourse.exercises.checks import Exercise, sets
+from kfcourse.exercises.checks import sets
 
 LEFT_OUT = "cli.py", "__main__.py", "exercises"  # what a student's notebook has no use for
 # What it needs of the exercises.
@@ -107,8 +107,3 @@ def answers() -> list[Path]:
     return sorted(
         {set_.folder.parent for set_ in sets().values()} | {Path(str(resources.files(EXERCISES)))}
     )
-
-
-def personal_numbers(own: Exercise) -> dict[str, dict[str, float]]:
-    """Personal numbers of an exercise by "letter variant": what a notebook is given of it."""
-    return {f"{own.letter} {own.variant.name}": own.numbers}

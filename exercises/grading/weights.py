@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from kfcourse.exercises.checks import Question, sets
-from kfcourse.exercises.checks.question import PASSED, WEIGHTS, WRONG
+from kfcourse.exercises.checks import Question, Result, sets
+from kfcourse.exercises.checks.question import WEIGHTS, WRONG
 from kfcourse.exercises.grading.results import Grade
 
 
@@ -25,12 +25,11 @@ class Credit:
     parts: float = 0.5
     follow_on: float = 0.0
 
-    def share(self, grade: Grade, question: str) -> float:
+    def share(self, result: Result) -> float:
         """Of the question's points."""
-        mark, comment = grade.marks.get(question), grade.comments.get(question)
-        if mark != WRONG or comment is None:
-            return float(mark == PASSED)
-        return max(self.parts * comment.share, self.follow_on * bool(comment.follows))
+        if result.status != WRONG:
+            return float(result.passed)
+        return max(self.parts * result.share, self.follow_on * bool(result.follows))
 
 
 USUAL = Credit()
@@ -41,30 +40,25 @@ def questions(letters: Iterable[str]) -> dict[str, Question]:
     return {question.name: question for letter in letters for question in sets()[letter].questions}
 
 
-def worth(grade: Grade | None, question: Question, credit: Credit) -> float:
-    """Points of an answer, to hundredths; none of a notebook that did not come."""
-    return round(WEIGHTS[question.level] * credit.share(grade, question.name), 2) if grade else 0.0
+def worth(grade: Grade, question: Question, credit: Credit) -> float:
+    """Points of an answer."""
+    return tidy(WEIGHTS[question.level] * credit.share(grade.results[question.name]))
 
 
 def points(grades: Iterable[Grade], credit: Credit, level: str | None = None) -> float:
-    """Points of all answers, those of one level or of all; whole ones without decimals."""
-    asked = [
-        (grade, question)
-        for grade in grades
-        if grade.letter in sets()
-        for question in sets()[grade.letter].questions
-    ]
+    """Points of all answers, those of one level or of all."""
     return tidy(
         sum(
             worth(grade, question, credit)
-            for grade, question in asked
+            for grade in grades
+            for question in sets()[grade.letter].questions
             if level in (None, question.level)
         )
     )
 
 
 def tidy(number: float) -> float:
-    """A number of points as it is printed: 3, not 3.0."""
+    """A number of points as it is printed, to hundredths: 3, not 3.0."""
     rounded = round(number, 2)
     return int(rounded) if rounded == int(rounded) else rounded
 

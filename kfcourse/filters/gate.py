@@ -47,26 +47,19 @@ class Gate(NamedTuple):
     Attributes
     ----------
     weight : ndarray (runs,)
-        Of the last measurement: 1, or 0 if it was refused, or the part of its components that
-        passed; NaN where there was none.
+        Of the last measurement: 1, or 0 if it was refused; NaN where there was none.
     in_a_row : ndarray of int (runs,)
-        How many were refused, with all their components, since the last that was not.
-    passed : ndarray of bool (runs, p)
-        Which components passed.
+        How many were refused since the last that was not.
     inner : object
         The memory of the filter behind the gate.
     edge : float
         With which probability the gate lets pass.
-    by_component : bool
-        Whether it judges each component for itself.
     """
 
     weight: Array
     in_a_row: Array
-    passed: Array
     inner: Any
     edge: float
-    by_component: bool
 
 
 def gated(
@@ -74,7 +67,6 @@ def gated(
     probability: float = 0.999,
     patience: int | None = 5,
     structure: Structure | None = None,
-    by_component: bool = False,
 ) -> Filter:
     """The same filter behind a gate.
 
@@ -91,9 +83,6 @@ def gated(
     structure : Structure, optional
         By which the gate knows what to expect, from the filter's prediction N(lambda, Psi); the
         filter's own by default.
-    by_component : bool
-        Judge each component of a measurement for itself, nu_i^2 <= gamma F_ii with one degree of
-        freedom: a fault of one sensor does not cost the others' components of the same row.
 
     Returns
     -------
@@ -135,52 +124,35 @@ def gated(
 
     def judged(state: State, y: Array) -> tuple[Measurement, Array, Array, Array]:
         """What was expected; squares of innovations, gamma, whether they are beyond and the track
-        not lost: (runs, p or 1)."""
+        not lost: (runs,)."""
         law = ahead(filter_, state._replace(memory=state.memory.inner))
         expected = expecting.at(state.step).measure(*law)
-        if by_component:
-            variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
-            size, limit = expected.innovation(y) ** 2 / variances, limits[[1]]
-        else:
-            size = size_of(expected.innovation(y), expected.F)[:, None]
-            limit = limits[(~np.isnan(y)).sum(axis=-1)][:, None]
+        size = size_of(expected.innovation(y), expected.F)
+        limit = limits[(~np.isnan(y)).sum(axis=-1)]
         lost = patience is not None and state.memory.in_a_row >= patience
-        return expected, size, limit, (size > limit) & ~np.asarray(lost)[..., None]
+        return expected, size, limit, (size > limit) & ~np.asarray(lost)
 
     def init(runs: int) -> State:
-        state = filter_.init(runs)
-        nothing, none = np.zeros((runs, filter_.model.p), dtype=bool), np.zeros(runs, dtype=int)
-        memory = Gate(none + np.nan, none, nothing, state.memory, probability, by_component)
-        return state._replace(memory=memory)
+        state, none = filter_.init(runs), np.zeros(runs, dtype=int)
+        return state._replace(memory=Gate(none + np.nan, none, state.memory, probability))
 
     def step(state: State, y: Array) -> State:
-        expected, _, _, beyond = judged(state, y)
-        after = filter_.step(state._replace(memory=state.memory.inner), np.where(beyond, np.nan, y))
-        measured = ~np.isnan(y)
-        passed, missing = measured & ~beyond, ~measured.any(axis=-1)
-        weight = np.where(
-            missing, np.nan, passed.sum(axis=-1) / np.maximum(measured.sum(axis=-1), 1)
-        )
-        refused = weight == 0
-        before = state.memory.in_a_row
+        expected, _, _, refused = judged(state, y)
+        seen = np.where(refused[:, None], np.nan, y)
+        after = filter_.step(state._replace(memory=state.memory.inner), seen)
+        missing, before = np.isnan(y).all(axis=-1), state.memory.in_a_row
+        weight = np.where(missing, np.nan, ~refused)
         in_a_row = np.where(missing, before, (before + 1) * refused)
         if patience is not None and (losing := refused & (in_a_row == patience)).any():
             wider = np.where(losing, _widening(expected, state.predicted, y), 1.0)
             after = after._replace(
                 predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None])
             )
-        memory = Gate(weight, in_a_row, passed, after.memory, probability, by_component)
-        return after._replace(memory=memory)
+        return after._replace(memory=Gate(weight, in_a_row, after.memory, probability))
 
     def evidence(before: State, y: Array, after: State) -> Array:
         expected, size, limit, beyond = judged(before, y)
-        if not by_component:
-            return log_density(expected, y) + 0.5 * np.where(beyond, size - limit, 0.0)[:, 0]
-        variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
-        at_the_edge = -0.5 * np.where(beyond, limit + np.log(2 * np.pi * variances), 0.0).sum(
-            axis=-1
-        )
-        return log_density(expected, np.where(beyond, np.nan, y)) + at_the_edge
+        return log_density(expected, y) + 0.5 * np.where(beyond, size - limit, 0.0)
 
     # what needs the filter's own memories does not go with those of the gate
     return replace(

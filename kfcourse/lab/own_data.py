@@ -88,7 +88,6 @@ class Analysis(NamedTuple):
             f"{likelihood:.2f}."
         ]
         if self.gate is not None:
-            # with some components at least
             refused = np.flatnonzero(weight < 1) + 1
             where = ": rows " + ranges(refused[:MANY].tolist()) if len(refused) else ""
             more = ", ..." if len(refused) > MANY else ""

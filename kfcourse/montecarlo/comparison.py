@@ -12,7 +12,7 @@ import numpy as np
 
 from kfcourse.errors import Reason
 from kfcourse.laws import CONFIDENCE, Array
-from kfcourse.montecarlo.statistics import Estimate, Sums, ratio, rejected
+from kfcourse.montecarlo.statistics import Estimate, Sums, ratio, rejected, without_each
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.writing import by_thousands
@@ -70,8 +70,6 @@ class Comparison:
     smoothing : Comparison, optional
         The same of smoothers on the same trajectories, if `compare` was given any: their error
         variances given the whole record, and how far they are above the exact smoother.
-    scored : bool
-        Whether predictions were judged: `log_score` and `crps`.
     """
 
     model: Model | JumpModel
@@ -83,7 +81,6 @@ class Comparison:
     designed: tuple[str, ...] = ()
     left_out: Mapping[str, Reason] = field(default_factory=dict)
     smoothing: Comparison | None = None
-    scored: bool = False
 
     def __repr__(self) -> str:
         compared = (
@@ -107,6 +104,11 @@ class Comparison:
         """Whether the exact AOF ran."""
         return EXACT in self.names
 
+    @property
+    def scored(self) -> bool:
+        """Whether predictions were judged: `log_score` and `crps`."""
+        return "crps" in self.sums
+
     @cached_property
     def control(self) -> str:
         """The filter that others are related to where there is no bound: the Gaussian AOF if there,
@@ -128,7 +130,7 @@ class Comparison:
     def rounding(self) -> Array:
         """Error variances, (steps,), that may be of rounding alone: of states so large, in
         doubles."""
-        return ROUNDING * self.sums.size.sum(axis=-1) / self.sums.weight.sum()
+        return ROUNDING * self.sums["size"].sum(axis=-1) / self.sums["weight"].sum()
 
     @cached_property
     def without_error(self) -> Array:
@@ -143,7 +145,7 @@ class Comparison:
         if not self.has_bound:
             return np.zeros(self.steps, dtype=bool)
         bound = self._means("own", EXACT)
-        beaten = ~(self.sums.means("doubt")[:, 0] <= UNHEALTHY * bound[:, 0])
+        beaten = ~(self._means("distance", EXACT)[:, 0] <= UNHEALTHY * bound[:, 0])
         for name in self.entrants:
             above = Estimate.jackknife(self._means("square", name).sum(axis=1) - bound)
             beaten |= above.value < -BEATEN * above.standard_error
@@ -161,11 +163,12 @@ class Comparison:
         `LOST` times the best D_k."""
         squares = {name: self._means("square", name)[..., 0].sum(axis=1) for name in self.entrants}
         most = LOST * np.min([*squares.values()], axis=0, initial=np.inf) + self.rounding
-        heavy = {
-            name: self._largest(name) > HEAVY * squares[name] * self.sums.weight.sum()
-            for name in squares
+        largest = dict(zip(self.names, self.sums["largest"].max(axis=-1), strict=True))
+        heavy = HEAVY * self.sums["weight"].sum()
+        diverged = {
+            name: (square > most) & (largest[name] > heavy * square)
+            for name, square in squares.items()
         }
-        diverged = {name: heavy[name] & (squares[name] > most) for name in squares}
         return {name: steps for name, steps in diverged.items() if steps.any()}
 
     # --- accuracy
@@ -198,8 +201,6 @@ class Comparison:
 
     def bound(self) -> Estimate:
         """D_k of the exact AOF, (steps,), as the mean of its own variance."""
-        if not self.has_bound:
-            raise KeyError(f"the bound needs {EXACT} among the filters")
         return self.error_variance(EXACT)
 
     def gap(self, name: str) -> Estimate:
@@ -359,10 +360,8 @@ class Comparison:
             raise KeyError(
                 f"no results for {name!r}{why}; this comparison has {', '.join(self.names)}"
             )
-        return self.sums.means(kind)[self.names.index(name)]
-
-    def _largest(self, name: str) -> Array:
-        return np.asarray(self.sums.largest[self.names.index(name)].max(axis=-1))
+        sums = self.sums[kind][self.names.index(name)]
+        return without_each(sums) / without_each(self.sums["weight"])
 
     def _variance(self, name: str) -> Array:
         """D_k, (steps, ...)."""

@@ -16,7 +16,7 @@ from kfcourse.errors import NotFinite, Refused, expect
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design
 from kfcourse.laws import NegativeVariance
-from kfcourse.montecarlo.ensemble import Instant
+from kfcourse.montecarlo.ensemble import Instant, check_finite
 
 
 def failed(name: str, step: int, error: Exception) -> NotFinite:
@@ -64,6 +64,7 @@ def design(
             if k == 0:
                 check_sizes(designs, instant.x.shape[1], instant.y.shape[1])
                 states = [design_.init(len(instant.x)) for design_ in designs]
+            check_finite(k, instant.x_next)
             results = parallel(
                 joblib.delayed(_fitted)(design_, state, instant, k)
                 for design_, state in zip(designs, states, strict=True)
@@ -107,23 +108,16 @@ def _fitted(design_: Design, state: State, instant: Instant, k: int) -> tuple[St
                         design_.name,
                     )
                 if not np.isfinite(moments.scatter).all():
-                    raise _diverged(design_.name, instant, k)
+                    raise NotFinite(
+                        f"{design_.name}, step {k}: the design met infinite or NaN values; the "
+                        f"model or this filter diverges",
+                        design_.name,
+                        "infinite",
+                        step=k,
+                    )
                 fits.append(moments.regression())
                 request = equations.send(fits[-1])
         except StopIteration as stop:
             return with_angles_on_circle(stop.value, design_.model.angles.x), fits
         except (NegativeVariance, np.linalg.LinAlgError) as error:
             raise failed(design_.name, k, error) from None
-
-
-def _diverged(name: str, instant: Instant, k: int) -> NotFinite:
-    if not (np.isfinite(instant.x_next).all() and np.isfinite(instant.y).all()):
-        return NotFinite(
-            f"step {k}: the model's trajectories become infinite, check its equations and "
-            f"parameters"
-        )
-    words = (
-        f"{name}, step {k}: the design met infinite or NaN values; the model or this filter "
-        f"diverges"
-    )
-    return NotFinite(words, name, "infinite", step=k)

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
 from kfcourse.errors import NotFinite, expect, expect_sizes
+from kfcourse.filters.exact.laws import modes_of
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.symbolic.equations import compile_model
@@ -31,7 +32,7 @@ LARGEST = 1e100
 class Instant(NamedTuple):
     """One step of an ensemble: x_k (N, n), y_k (N, p), x_{k+1} (N, n).
 
-    In a model that jumps also the modes i_k and i_{k+1}, (N,), numbers from 0.
+    Also the modes i_k and i_{k+1}, (N,), numbers from 0; without modes all are 0.
     """
 
     x: Array
@@ -85,8 +86,8 @@ class Ensemble:
 def side_by_side(ensembles: Sequence[Ensemble]) -> Iterator[Instant]:
     """The steps of ensembles of one model, as of a single one that holds all their trajectories."""
     model, steps = ensembles[0].model, ensembles[0].steps
-    advance = _jumping(model) if isinstance(model, JumpModel) else _moving(model)
-    start = _joined([_initial(ensemble) for ensemble in ensembles])
+    advance = _advance(model)
+    start: list[Any] = _joined([_initial(ensemble) for ensemble in ensembles])
     for first in range(0, steps, STEPS_AT_ONCE):
         count = min(STEPS_AT_ONCE, steps - first)
         parts = [_noises(ensemble, 1 + first // STEPS_AT_ONCE, count) for ensemble in ensembles]
@@ -94,11 +95,7 @@ def side_by_side(ensembles: Sequence[Ensemble]) -> Iterator[Instant]:
             noises = _joined([[kind[k] for kind in part] for part in parts])
             instant = advance(first + k, *start, *noises)
             yield instant
-            start = (
-                [instant.x_next]
-                if instant.mode_next is None
-                else [instant.x_next, instant.mode_next]
-            )
+            start = [instant.x_next, instant.mode_next]
 
 
 @overload
@@ -121,18 +118,22 @@ def simulate(
 
 
 def foretold(ensemble: Ensemble, k: int, drawn: tuple[Array, Array] | None) -> Array:
-    """y_k (runs, p) of an ensemble whose states x_{k-1} (runs, n) and modes (runs,), if it has any,
-    are these; of the first step by the prior."""
-    model = ensemble.model
-    before, now = zip(*_noises(ensemble, 1, 2), strict=True)
-    if isinstance(model, JumpModel):
-        advance, kinds = _jumping(model), 2
-    else:
-        advance, kinds = _moving(model), 1
+    """y_k (runs, p) of an ensemble whose states x_{k-1} (runs, n) and modes (runs,) are these; of
+    the first step by the prior."""
+    advance, (before, now) = _advance(ensemble.model), zip(*_noises(ensemble, 1, 2), strict=True)
     if drawn is None:
         return advance(0, *_initial(ensemble), *now).y
-    moved = advance(k - 1, *drawn[:kinds], *before)
-    return advance(k, *(moved.x_next, moved.mode_next)[:kinds], *now).y
+    moved = advance(k - 1, *drawn, *before)
+    return advance(k, moved.x_next, moved.mode_next, *now).y
+
+
+def check_finite(k: int, *trajectories: Array) -> None:
+    """NotFinite if these arrays of a step are not all finite."""
+    if not all(np.isfinite(values).all() for values in trajectories):
+        raise NotFinite(
+            f"step {k}: the model's trajectories become infinite, check its equations and "
+            f"parameters"
+        )
 
 
 def weights(prior: Gaussian, x: Array, wide: float | None) -> Array:
@@ -164,47 +165,33 @@ def stratified(rng: np.random.Generator, runs: int, r: int, wide: float) -> Arra
     return standard
 
 
-Advance = Callable[..., Instant]
+def _advance(model: Model | JumpModel) -> Callable[..., Instant]:
+    """One step of the model: (k, x, mode, standard v, w, u) -> y = b^mode(x, w), the next mode by
+    u, x' = a^next(x, v).  A model that does not jump needs no u, and stays in the mode 0."""
+    modes = [(mode, *compile_model(mode)) for mode in modes_of(model)]
+    between = modes[0][0].between
 
-
-def _moving(model: Model) -> Advance:
-    """One step of the model: (k, x, standard v, w) -> x, y = b(x, w), x' = a(x, v)."""
-    state, meter = compile_model(model)
-
-    def advance(k: int, x: Array, v: Array, w: Array) -> Instant:
-        with np.errstate(over="ignore", invalid="ignore"):  # who looks at it reports what diverges
-            y = meter(x, _of_law(w, model.meter_noise), k)
-            x_next = state(x, _of_law(v, model.state_noise), k)
-        # a formula without noise and state is one constant for all trajectories
-        y = np.broadcast_to(y, (len(x), model.p))
-        x_next = np.broadcast_to(x_next, (len(x), model.n))
-        if model.between is not None and not (np.abs(x_next) < LARGEST).all():
-            raise NotFinite(
-                f"step {k} of {model}: a trajectory passes {LARGEST:g}: the drift outgrows the "
-                f"state, as x**3 does, or is too fast for {model.between.substeps} sub-steps an "
-                f"interval; check its sign, or give more `substeps`"
+    def advance(k: int, x: Array, mode: Array, v: Array, w: Array, *u: Array) -> Instant:
+        mode_next = mode
+        if isinstance(model, JumpModel):
+            pi = (
+                model.transition_of(x, k)[np.arange(len(x)), mode]
+                if model.by_state
+                else model.transition_at(k)[mode]
             )
-        return Instant(x, on_circle(y, model.angles.y), on_circle(x_next, model.angles.x))
-
-    return advance
-
-
-def _jumping(model: JumpModel) -> Advance:
-    """One step of a model that jumps: (k, x, mode, v, w, u) -> y = b^mode(x, w), the next mode by
-    u, x' = a^next(x, v)."""
-    modes = [(mode, *compile_model(mode)) for mode in model.modes]
-
-    def advance(k: int, x: Array, mode: Array, v: Array, w: Array, u: Array) -> Instant:
-        if model.by_state:
-            mode_next = _chosen(model.transition_of(x, k)[np.arange(len(x)), mode], u)
-        else:
-            mode_next = _chosen(model.transition_at(k)[mode], u)
+            mode_next = _chosen(pi, *u)
         y, x_next = np.empty((len(x), model.p)), np.empty((len(x), model.n))
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):  # who looks at it reports what diverges
             for j, (law, state, meter) in enumerate(modes):
-                before, after = mode == j, mode_next == j
+                before, after = (mode == j, mode_next == j) if len(modes) > 1 else (..., ...)
                 y[before] = meter(x[before], _of_law(w[before], law.meter_noise), k)
                 x_next[after] = state(x[after], _of_law(v[after], law.state_noise), k)
+        if between is not None and not (np.abs(x_next) < LARGEST).all():
+            raise NotFinite(
+                f"step {k} of {model}: a trajectory passes {LARGEST:g}: the drift outgrows the "
+                f"state, as x**3 does, or is too fast for {between.substeps} sub-steps an "
+                f"interval; check its sign, or give more `substeps`"
+            )
         y, x_next = on_circle(y, model.angles.y), on_circle(x_next, model.angles.x)
         return Instant(x, y, x_next, mode, mode_next)
 
@@ -224,21 +211,20 @@ def _stream(seed: np.random.SeedSequence, *key: int) -> np.random.Generator:
 
 
 def _initial(ensemble: Ensemble) -> list[Array]:
-    """Initial states (runs, n), and modes if there are any; these from a stream of their own."""
+    """Initial states (runs, n) and modes (runs,); these from a stream of their own."""
     model, runs, wide = ensemble.model, ensemble.runs, ensemble.wide
     rng, r = _stream(ensemble.seed, 0, 0), len(model.prior.mean)
     standard = rng.standard_normal((r, runs)).T if wide is None else stratified(rng, runs, r, wide)
     x = on_circle(_of_law(standard, model.prior), model.angles.x)
-    if not isinstance(model, JumpModel):
-        return [x]
-    return [x, _chosen(model.first[None], _stream(ensemble.seed, 0, 0, 0).random(runs))]
+    first = model.first if isinstance(model, JumpModel) else np.ones(1)
+    return [x, _chosen(first[None], _stream(ensemble.seed, 0, 0, 0).random(runs))]
 
 
 def _noises(ensemble: Ensemble, key: int, steps: int) -> list[Array]:
     """Standard normal numbers for v and w of a few steps, (steps, runs, r); of a model that jumps
     also (steps, runs) in 0 to 1."""
     model, runs, rng = ensemble.model, ensemble.runs, _stream(ensemble.seed, 0, key)
-    mode = model.modes[0] if isinstance(model, JumpModel) else model
+    mode = modes_of(model)[0]
     # every component contiguous in memory
     drawn = [
         rng.standard_normal((steps, len(law.mean), runs)).swapaxes(1, 2)

@@ -29,7 +29,7 @@ from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import check_sizes, design, failed
-from kfcourse.montecarlo.ensemble import Ensemble, Instant, side_by_side, weights
+from kfcourse.montecarlo.ensemble import Ensemble, Instant, check_finite, side_by_side, weights
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.scores import scored
 from kfcourse.montecarlo.statistics import Sums, claimed
@@ -263,7 +263,7 @@ def _compared(
     able, sums = _able(filters, left_out, summed)
     names, runs = tuple(filter_.name for filter_ in able), sum(batch.runs for batch in batches)
     comparison = Comparison(first.model, names, runs, first.steps, seed, sums)
-    return replace(comparison, left_out=left_out, scored=options.get("scores") is not None)
+    return replace(comparison, left_out=left_out)
 
 
 def _summed(
@@ -282,7 +282,8 @@ def _summed(
     parts = [batches[b : b + each] for b in range(0, len(batches), each)]
     work = (joblib.delayed(run_batches)(filters, part, back=back, scores=scores) for part in parts)
     done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
-    return Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
+    sums = [*_progress("comparing", len(parts), "part", progress, done)]
+    return {kind: np.concatenate([part[kind] for part in sums], axis=-1) for kind in sums[0]}
 
 
 def run_batches(
@@ -294,45 +295,57 @@ def run_batches(
 ) -> Sums:
     """Advance all filters together over the steps of some batches; `back`: let them look back from
     the end; `scores`: judge what they expect of measurements."""
-    model, steps, wide = batches[0].model, batches[0].steps, batches[0].wide
+    model, angles = batches[0].model, batches[0].model.angles.x
     starts = np.cumsum([0, *(batch.runs for batch in batches[:-1])])
-    sums = Sums.empty(len(filters), steps, model.n, len(batches))
     exact = next((i for i, filter_ in enumerate(filters) if filter_.name == EXACT), None)
-    angles = model.angles.x
+    sizes, rows = list[Array](), list[list[Sums]]()
 
     def total(values: Array) -> Array:
         """The weighted sums over each batch, of (..., runs)."""
         return np.add.reduceat(weight * values, starts, axis=-1)
 
-    # what diverges is reported below, by name
+    # what diverges is reported by name
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for k, (instant, before, laws) in enumerate((_back if back else _onward)(filters, batches)):
             if k == 0:
-                weight = weights(model.prior, instant.x, wide)
-                sums.weight[:] = np.add.reduceat(weight, starts)
-            sums.size[k] = total((instant.x**2).sum(axis=1))
-            for i, state in enumerate(laws):
-                with _named(filters[i], k):
+                weight = weights(model.prior, instant.x, batches[0].wide)
+            sizes.append(total((instant.x**2).sum(axis=1)))
+            check_finite(k, sizes[-1], instant.y)
+            row = list[Sums]()
+            for i, (filter_, state) in enumerate(zip(filters, laws, strict=True)):
+                with _named(filter_, k):
                     error = near(instant.x, state.posterior.mean, angles) - state.posterior.mean
                     square = error**2
-                    sums.error[i, k], sums.square[i, k] = total(error.T), total(square.T)
-                    largest = weight * square.sum(axis=1)
-                    sums.largest[i, k] = np.maximum.reduceat(largest, starts)
                     own, normalised = claimed(error, state.posterior.cov)
-                    sums.own[i, k], sums.normalised[i, k] = total(own), total(normalised)
+                    parts = {"error": error.T, "square": square.T, "own": own}
+                    parts["normalised"] = normalised
                     if scores is not None:
-                        both = scored(filters[i], scores, before[i], instant.y, state, batches[0])
-                        sums.log_score[i, k], sums.crps[i, k] = map(total, both)
-            if exact is None:
-                continue
-            first, second, error = _twice(laws[exact])
-            sums.doubt[k] = total(error**2)
-            for i in {*range(len(laws))} - {exact}:
-                mean = laws[i].posterior.mean
-                product = difference(mean, first, angles) * difference(mean, second, angles)
-                sums.distance[i, k] = total(product.sum(axis=1))
-    _check_finite(filters, sums)
-    return sums
+                        parts["log_score"], parts["crps"] = scored(
+                            filter_, scores, before[i], instant.y, state, batches[0]
+                        )
+                row.append({kind: total(values) for kind, values in parts.items()})
+                row[i]["largest"] = np.maximum.reduceat(weight * square.sum(axis=1), starts)
+                if np.isnan(row[i]["own"]).any() or not np.isfinite(row[i]["square"]).all():
+                    raise NotFinite(
+                        f"step {k}: {filter_.name} became infinite or NaN although the "
+                        f"trajectories are finite: the filter diverges, or its model is another",
+                        filter_.name,
+                        "infinite",
+                        step=k,
+                    )
+            if exact is not None:
+                first, second, doubt = _twice(laws[exact])
+                for sums, state in zip(row, laws, strict=True):
+                    mean = state.posterior.mean
+                    product = difference(mean, first, angles) * difference(mean, second, angles)
+                    sums["distance"] = total(product.sum(axis=1))
+                row[exact]["distance"] = total(doubt**2)
+            rows.append(row)
+    of_filters = {
+        kind: np.array([[row[i][kind] for row in rows] for i in range(len(filters))])
+        for kind in rows[0][0]
+    }
+    return {"weight": np.add.reduceat(weight, starts), "size": np.array(sizes), **of_filters}
 
 
 def _begun(filter_: Filter, batches: Sequence[Ensemble]) -> State:
@@ -392,26 +405,6 @@ def _named(filter_: Filter, step: int) -> Iterator[None]:
         if filter_.slow or isinstance(error, numbers):
             raise failed(filter_.name, step, error) from None
         raise
-
-
-def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
-    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)) & ~np.isnan(sums.own).any(axis=2))
-    if finite.all():
-        return
-    step = int(np.argmin(finite.all(axis=0)))
-    if not finite[:, step].any():
-        raise NotFinite(
-            f"step {step}: every filter fails; the model's trajectories become infinite, check "
-            f"its equations and parameters"
-        )
-    filter_ = filters[int(np.argmin(finite[:, step]))]
-    raise NotFinite(
-        f"step {step}: {filter_.name} became infinite or NaN although the trajectories are finite: "
-        f"the filter diverges, or its model is another",
-        filter_.name,
-        "infinite",
-        step=step,
-    )
 
 
 def _progress(

@@ -9,9 +9,8 @@ So differences, ratios and means over steps need no formula of their own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 import scipy
@@ -107,56 +106,19 @@ def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array
     )
 
 
-class Sums(NamedTuple):
-    """Sums over batches (last axis), for a tuple of filters (first axis).
-
-    Attributes
-    ----------
-    weight : ndarray (batches,)
-        Of the weights of the trajectories; their number if all are 1.
-    size : ndarray (steps, batches)
-        Of |x|^2, what rounding errors are to be compared with.
-    doubt : ndarray (steps, batches)
-        Of the squared error that the exact filter states of itself.
-    error, square : ndarray (filters, steps, n, batches)
-        Of e = x - z, and of e^2.
-    own, normalised : ndarray (filters, steps, batches)
-        Of the variance that each filter claims, tr p, and of e^T p^-1 e / n.
-    distance : ndarray (filters, steps, batches)
-        Of |z - z_exact|^2, if there is an exact filter, else 0.
-    largest : ndarray (filters, steps, batches)
-        The largest single |e|^2.
-    log_score, crps : ndarray (filters, steps, batches)
-        Of the scores of each filter's prediction of the measurement, if they are asked for, else 0.
-    """
-
-    weight: Array
-    size: Array
-    doubt: Array
-    error: Array
-    square: Array
-    own: Array
-    normalised: Array
-    distance: Array
-    largest: Array
-    log_score: Array
-    crps: Array
-
-    @classmethod
-    def empty(cls, filters: int, steps: int, n: int, batches: int) -> Sums:
-        """Room for the sums."""
-        full, plain = (filters, steps, n, batches), (filters, steps, batches)
-        shapes = (plain[2:], plain[1:], plain[1:], full, full, *6 * [plain])
-        return cls(*map(np.zeros, shapes))
-
-    @classmethod
-    def together(cls, parts: Sequence[Sums]) -> Sums:
-        """Sums over the batches of all parts."""
-        return cls(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
-
-    def means(self, name: str) -> Array:
-        """Means of a field over all batches, and without each of them: (..., 1 + batches)."""
-        return _without_each(getattr(self, name)) / _without_each(self.weight)
+# Sums over batches (last axis):
+#
+# weight               (batches,) of the weights of the trajectories; their number if all are 1
+# size                 (steps, batches) of |x|^2, what rounding errors are to be compared with
+# error, square        (filters, steps, n, batches) of e = x - z, and of e^2
+# own, normalised      (filters, steps, batches) of the variance that each filter claims, tr p, and
+#                      of e^T p^-1 e / n
+# largest              (filters, steps, batches) the largest single |e|^2
+# distance             (filters, steps, batches) of |z - z_exact|^2, if there is an exact filter; of
+#                      itself the squared error that it states
+# log_score, crps      (filters, steps, batches) of the scores of each filter's prediction of the
+#                      measurement, if they are asked for
+Sums: TypeAlias = dict[str, Array]
 
 
 def claimed(error: Array, cov: Array) -> tuple[Array, Array]:
@@ -176,11 +138,12 @@ def means_without_each(values: Array) -> Array:
     starts = np.linspace(0, len(values), min(BATCHES, len(values)) + 1).astype(int)
     sums = np.add.reduceat(values, starts[:-1], axis=0)
     return np.moveaxis(
-        _without_each(np.moveaxis(sums, 0, -1)) / _without_each(np.diff(starts)), -1, 0
+        without_each(np.moveaxis(sums, 0, -1)) / without_each(np.diff(starts)), -1, 0
     )
 
 
-def _without_each(sums: Array) -> Array:
+def without_each(sums: Array) -> Array:
+    """Sums over all batches (last axis), and without each of them: (..., 1 + batches)."""
     total = sums.sum(axis=-1, keepdims=True)
     if sums.shape[-1] == 1:
         return total

@@ -27,7 +27,7 @@ import sympy as sp
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
 from kfcourse.filters.programs import Rule, array_name, in_numbers, scalar
-from kfcourse.lab.short_names import LAB, Structures, title
+from kfcourse.lab.short_names import LAB, Structures
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
 
@@ -174,7 +174,6 @@ def model_source(model: Model, names: Sequence[str] = LAB) -> str:
         "levels": [symbol.name for symbol in levels(model)],
         "prior": {"mean": float(model.prior.mean[0]), "variance": float(model.prior.cov[0, 0])},
         "noises": [len(model.v), len(model.w)],
-        "titles": {name: title(name) for name in names},
     }
     body = [f"{key}: {text.strip()}" for key, text in parts.items()]
     return (

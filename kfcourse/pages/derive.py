@@ -3,17 +3,16 @@ those that readers type."""
 
 from __future__ import annotations
 
-import html
 import json
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
 
 from kfcourse.exercises.derivations import Report, check_text
 from kfcourse.exercises.derivations.verdicts import MARKS, Verdict
-from kfcourse.exercises.derivations.wording import DEFINITIONS, RULES
+from kfcourse.exercises.derivations.wording import DEFINITIONS, RULES, coded
 from kfcourse.lab.variants import Variant, find_variant
 
 SCRIPT = Path(__file__).parent / "data" / "derive.js"
@@ -30,36 +29,20 @@ def checked(text: str) -> Report:
 def shown(report: Report) -> str:
     """A report as a list in HTML: each line with its mark, the named terms underlined, and what is
     said of it."""
-    return "\n".join(
-        f'<ol class="kf-derived">\n{"".join(map(_item, chain.verdicts))}</ol>'
-        for chain in report.chains
-    )
+    return _TEMPLATES.get_template("derived.html.j2").render(report=report, marks=MARKS)
 
 
-def _item(verdict: Verdict) -> str:
-    words = "".join(f"<p>{_coded(part)}</p>" for part in (verdict.says, verdict.rule) if part)
-    state = verdict.status.replace(" ", "-")
-    status = f"<span>{MARKS[verdict.status]} {verdict.status}</span>"
-    return f'<li class="kf-{state}"><code>{_marked(verdict)}</code> {status}{words}</li>\n'
-
-
-def _marked(verdict: Verdict) -> str:
+def _marked(verdict: Verdict) -> Markup:
     """The line, its named terms marked."""
-    pieces, end = [], 0
+    text, end = Markup(), 0
     for start, stop in sorted(verdict.spans):
         if start >= end:
-            pieces += [
-                html.escape(verdict.text[end:start]),
-                f"<mark>{html.escape(verdict.text[start:stop])}</mark>",
-            ]
+            text += verdict.text[end:start] + Markup("<mark>%s</mark>") % verdict.text[start:stop]
             end = stop
-    return "".join([*pieces, html.escape(verdict.text[end:])])
+    return text + verdict.text[end:]
 
 
-def _coded(text: str) -> str:
-    return re.sub(
-        r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False).partition("\n")[0]
-    )
+_TEMPLATES.filters |= {"coded": coded, "marked": _marked}
 
 
 def described(variants: Mapping[str, Variant]) -> str:

@@ -25,8 +25,10 @@ from kfcourse.lab.plots import style
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import Variant
 from kfcourse.pages.browser import script
+from kfcourse.pages.exponents import log_normal
 from kfcourse.records.examination import normal_bound
 from kfcourse.symbolic import javascript
+from kfcourse.symbolic.structure import Structure
 
 DATA = Path(__file__).parent / "data"
 HELPER = DATA / "figure.js"
@@ -120,8 +122,7 @@ def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
         DATA / "live-lab.js"
     ).read_text(encoding="utf-8")
     given: dict[str, Any] = {
-        "styles": {name: line_style(name) for name in LAB},
-        "titles": {name: title(name) for name in LAB},
+        "looks": {name: look(name) for name in LAB},
         "variants": {key: f"{key}: {variant.title}" for key, variant in variants.items()},
         "first": "53",
         "step": 4,
@@ -134,58 +135,41 @@ def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
     )
 
 
-def line_style(name: str) -> dict[str, str]:
-    """A filter's colour and dash, as in every figure of the book."""
+def look(name: str) -> dict[str, str]:
+    """A filter's label, colour and dash, as in every figure of the book."""
     line = style(name)
-    return {"colour": line["color"], "dash": _DASHES[line["linestyle"]]}
+    return {
+        "label": title(name),
+        "colour": line["color"],
+        "dash": _DASHES[line["linestyle"]],
+    }
 
 
-def two_lines(
-    name: str,
-    x: sp.Symbol,
-    mean: sp.Symbol,
-    variance: sp.Symbol,
-    signal: sp.Expr,
-    density: sp.Expr,
-    tangent: tuple[sp.Expr, sp.Expr],
-    best: tuple[sp.Expr, sp.Expr],
-    left: sp.Expr,
-    first: Mapping[str, float],
-) -> str:
-    """A signal, its tangent and the line that is best on average, with the law of the state under
-    the reader's hand.
+def two_lines(name: str, tangent: Structure, best: Structure, first: Mapping[str, float]) -> str:
+    """The signal of a meter, its tangent and the line that is best on average, with the law of the
+    state under the reader's hand.
 
     Parameters
     ----------
     name : str
         Of the figure.
-    x, mean, variance : Symbol
-        State, and the moments of its law.
-    signal, density : Expr
-        Of x; of x and the moments.
-    tangent, best : (Expr, Expr)
-        Of the moments: value h at the mean and slope G, which make the line h + G (x - mean).
-    left : Expr
-        Of the moments: variance of the signal that the best line does not explain.
+    tangent, best : Structure
+        `linearised` and `gaussian` of a scalar model: their h and G make the lines h + G (x - m).
     first : dict
         The "mean" and the "variance" shown first.
     """
-    numbers = dict(
-        tangentMean=tangent[0],
-        tangentSlope=tangent[1],
-        bestMean=best[0],
-        bestSlope=best[1],
-        left=left,
-    )
-    curves = {
-        "signal": signal,
-        "density": density,
-        "tangent": tangent[0] + tangent[1] * (x - mean),
-        "best": best[0] + best[1] * (x - mean),
-    }
-    moments = {mean: "mean", variance: "variance"}
+    assert best.formulas is not None
+    (x,), (m,), (d,) = best.model.x, best.formulas.m, best.formulas.d
+    curves = {"signal": tangent["h"].subs(m, x), "density": sp.exp(log_normal(x, m, d))}
+    # what the best line does not explain, less the noise of the meter
+    left, noise = (each["F"] - each["G"] ** 2 * d for each in (best, tangent))
+    numbers = {"left": sp.simplify(left - noise)}
+    for line, of in (("tangent", tangent), ("best", best)):
+        curves[line] = of["h"] + of["G"] * (x - m)
+        numbers |= {f"{line}Mean": of["h"], f"{line}Slope": of["G"]}
+    moments = {m: "mean", d: "variance"}
     loops = [
-        *(printed(name, {"x": x}, e, moments) for name, e in curves.items()),
+        *(printed(curve, {"x": x}, formula, moments) for curve, formula in curves.items()),
         printed("numbers", {}, numbers, moments),
     ]
     return drawn(name, "The tangent and the best line", "two-lines", loops, dict(first))
@@ -227,7 +211,7 @@ def gains(
         )
         made = printed("estimate", {"y": measurement}, estimate, letters)
         each.append(f"{json.dumps(short)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
-    looks = {name: {"label": title(name), **line_style(name)} for name in estimates}
+    looks = {name: look(name) for name in estimates}
     settings = {"first": dict(first), "variances": variances, "dots": rounded(dots), "looks": looks}
     return drawn(
         name,

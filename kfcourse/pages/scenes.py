@@ -13,13 +13,13 @@ from typing import Any
 import sympy as sp
 
 from kfcourse.filters import aof
-from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.short_names import LAB
 from kfcourse.laws import Array
 from kfcourse.linear.consistency import autocorrelation, chi_squared_bounds, innovations
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.experiment import predictions
 from kfcourse.pages.browser import model_source
-from kfcourse.pages.explore import drawn, line_style, printed, rounded
+from kfcourse.pages.explore import drawn, look, printed, rounded
 from kfcourse.records.examination import normal_bound
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
@@ -168,7 +168,7 @@ def who_leads(name: str, leaders: Mapping[str, Any], first: tuple[int, float]) -
     first : (int, float)
         Step and ratio shown first.
     """
-    looks = {name: {"label": title(name), **line_style(name)} for name in leaders["gaps"][0][0]}
+    looks = {name: look(name) for name in leaders["gaps"][0][0]}
     kinds = {look["colour"]: look["label"].lstrip("GL") for look in looks.values()}
     settings = {
         **leaders,

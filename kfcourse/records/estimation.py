@@ -30,7 +30,8 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
 
-# of the differences that stand for derivatives, in units by which the likelihood changes by about 1
+# of the differences that stand for derivatives, in units by which the likelihood changes by about
+# 1: a second one of it errs by STEP^2, and by rounding, 1e-16 of it over STEP^2
 STEP = 1e-3
 # information of a parameter that is none: the likelihood of an e times larger variance differs by
 # half of this
@@ -117,9 +118,11 @@ def estimate(
     def parameters(t: Array) -> Array:
         return np.where(logs, np.exp(np.where(logs, t, 0.0)), t)
 
+    def at(t: Array) -> Model:
+        return model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
+
     def log_likelihood(t: Array) -> float:
-        here = model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
-        return float(likelihood(build(here), y).sum())
+        return float(likelihood(build(at(t)), y).sum())
 
     def cost(t: Array) -> float:
         bar.update()
@@ -137,17 +140,13 @@ def estimate(
         # the second time in the units that the likelihood has at its maximum
         for _ in range(1 if logs.all() else 2):
             unit = _units(cost, t, unit, logs)
-            t, result, information = _climb(cost, t, unit)
-    best = model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
-    if not (
-        result.success
-        and np.isfinite(information).all()
-        and np.linalg.eigvalsh(information).min() > -FLAT
-    ):
-        at = ", ".join(f"{name} = {float(best.parameters[name]):.6g}" for name in names)
+            t, result, information = _climb(cost, t, unit, names)
+    best = at(t)
+    if not (result.success and np.linalg.eigvalsh(information).min() > -FLAT):
+        last = ", ".join(f"{name} = {float(best.parameters[name]):.6g}" for name in names)
         # a gate's likelihood jumps where a measurement begins to pass
         raise ValueError(
-            f"no maximum of the likelihood was found ({result.message}; last at {at}): begin "
+            f"no maximum of the likelihood was found ({result.message}; last at {last}): begin "
             "nearer to it, fix a parameter, or leave out the measurements that a gate refuses, "
             "in the place of the gate"
         )
@@ -225,14 +224,28 @@ def _units(cost: Callable[[Array], float], t: Array, unit: Array, logs: Array) -
     return units
 
 
-def _climb(cost: Callable[[Array], float], start: Array, unit: Array) -> tuple[Array, Any, Array]:
+def _climb(
+    cost: Callable[[Array], float], start: Array, unit: Array, names: Sequence[str]
+) -> tuple[Array, Any, Array]:
     """The least cost downhill from a start, what the search says, and second derivatives in these
-    units."""
+    units; ValueError, which names the parameter, where the model ends."""
 
     def scaled(c: Array) -> float:
         return cost(start + unit * c)
 
-    derivatives = cache(lambda c: _derivatives(scaled, np.array(c)))
+    @cache
+    def derivatives(c: tuple[float, ...]) -> tuple[Array, Array]:
+        with np.errstate(invalid="ignore"):
+            slopes, second = _derivatives(scaled, np.array(c))
+        if not (inside := np.isfinite(second).all(axis=0)).all():
+            name = names[int(np.argmin(inside))]
+            raise ValueError(
+                f"the search came to a place where a small change of {name} leaves no "
+                f"likelihood, as a variance below zero does: declare {name} positive "
+                f"(positive=[...], --positive), or begin elsewhere"
+            )
+        return slopes, second
+
     result = scipy.optimize.minimize(
         scaled,
         np.zeros(len(start)),

@@ -54,8 +54,6 @@ class Examination(NamedTuple):
     log_likelihood : ndarray (steps, runs)
     edge : float
         Probability with which a gate lets pass; 1 without a gate.
-    by_component : bool
-        Whether the gate judges each component for itself.
     """
 
     estimate: Gaussian
@@ -65,7 +63,6 @@ class Examination(NamedTuple):
     passed: Array
     log_likelihood: Array
     edge: float
-    by_component: bool
 
 
 class Finding(NamedTuple):
@@ -111,20 +108,18 @@ def examine(filter_: Filter, y: Array) -> Examination:
         if k < len(y) - 1:
             noise = structure.at(k).transition(*after.posterior).Q
             _noise_of(noise, after.predicted.cov, f"the state's noise from step {k} to {k + 1}")
-    passed, weight = ~np.isnan(y), np.ones(y.shape[:2])
+    weight = np.ones(y.shape[:2])
     for k, state in enumerate(visited[1:]):
         weight[k] = getattr(state.memory, "weight", 1.0)
-        passed[k] &= getattr(state.memory, "passed", weight[k][:, None] > 0)
     smoothed = looked_back(filter_, tqdm(visited[1:], "looking back", **BAR), y)
     return Examination(
         stacked([state.posterior for state in visited[1:]]),
         stacked([state.posterior for state in smoothed]),
         Innovations(innovations, F),
         np.where(np.isnan(y).all(axis=-1), np.nan, weight),
-        passed,
+        ~np.isnan(y) & (weight > 0)[..., None],
         log_densities(filter_, visited, y),
         getattr(visited[-1].memory, "edge", 1.0),
-        getattr(visited[-1].memory, "by_component", False),
     )
 
 
@@ -173,10 +168,9 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
     That of the size is exact without a gate, and behind one that of a gamma law with the same mean
-    and variance (behind one that judges each component, of innovations that are not correlated with
-    each other); the others are those of normal laws for sums of many terms: thirty measurements are
-    enough.  Under weights that are neither 0 nor 1 none of this holds; nothing is found of a record
-    that was refused altogether.
+    and variance; the others are those of normal laws for sums of many terms: thirty measurements
+    are enough.  Under weights that are neither 0 nor 1 none of this holds; nothing is found of a
+    record that was refused altogether.
     """
     used, z = examined.passed[:, run].any(axis=-1), normal_bound()
     if not used.any():
@@ -186,12 +180,8 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
         examined.innovations.cov[used, run],
     )
     degrees = (~np.isnan(value)).sum(axis=-1)
-    if examined.by_component:
-        size = np.nansum(value**2 / np.diagonal(F, axis1=-2, axis2=-1)) / degrees.sum()
-        mean, variance = (degrees * part for part in _below(np.ones(1), examined.edge))
-    else:
-        size = size_of(value, F).sum() / degrees.sum()
-        mean, variance = _below(degrees, examined.edge)
+    size = size_of(value, F).sum() / degrees.sum()
+    mean, variance = _below(degrees, examined.edge)
     scale = variance.sum() / mean.sum()
     low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, TAILS) / degrees.sum()
     result = [Finding("size", float(size), float(low), float(high))]

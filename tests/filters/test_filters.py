@@ -176,6 +176,6 @@ def test_a_designed_filter_stops_where_its_design_does(variant53):
 
 
 def test_a_design_on_trajectories_that_diverge_says_so(variant53):
-    broken = [Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]
+    broken = [Instant(np.ones((3, 1)), np.ones((3, 1)), np.full((3, 1), np.inf))]
     with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
         design([duof(variant53)], broken)

@@ -20,7 +20,7 @@ from kfcourse import (
     simulate,
     smooth,
 )
-from kfcourse.filters import aof, duof, fos, gated, imm, kalman_filter, mfos, particle, pointmass
+from kfcourse.filters import duof, fos, gated, imm, kalman_filter, mfos, particle, pointmass
 from kfcourse.linear.consistency import innovations
 from kfcourse.records import weights
 
@@ -172,19 +172,12 @@ def test_what_a_gate_cannot_stand_before_is_refused():
         weights(kalman_filter(walk()), np.zeros(3))
 
 
-def test_components_are_judged_each_for_itself_on_request(plane):
-    """A gross error of one component costs that component alone; the likelihood counts it as one at
-    the gate's edge."""
-    y = spoiled(simulate(plane, 3, 9, seed=4).y)
-    structure = linearised(plane)
-    plain = aof(structure)
-    behind = gated(plain, 0.999, by_component=True)
-    seen = y.copy()
-    seen[2, 0] = seen[4, 1] = seen[5, 1, 0] = np.nan
-    assert_allclose(run(behind, y).mean, run(plain, seen).mean, rtol=1e-12)
-    assert_array_equal(weights(behind, y)[5], [1, 0.5, 1])
-    assert weights(gated(plain, 0.999), y)[5, 1] == 0  # the whole row
-    edge = chi2(1).ppf(0.999)
-    _, F = innovations(structure.measure, predictions(behind, y), y)
-    expected = likelihood(plain, seen)[5, 1] - 0.5 * (edge + np.log(2 * np.pi * F[5, 1, 0, 0]))
-    assert likelihood(behind, y)[5, 1] == pytest.approx(expected, rel=1e-12)
+def test_a_refused_measurement_is_as_likely_as_one_at_the_edge(plane):
+    y, plain = spoiled(simulate(plane, 3, 9, seed=4).y), kalman_filter(plane)
+    behind = gated(plain)
+    beyond = refused(behind, y)
+    F = innovations(linearised(plane).measure, predictions(behind, y), y).cov
+    edge = -0.5 * (chi2(2).ppf(0.999) + np.linalg.slogdet(2 * np.pi * F).logabsdet)
+    expected = np.where(beyond, edge, likelihood(plain, np.where(beyond[..., None], np.nan, y)))
+    assert beyond.sum() == 3
+    assert_allclose(likelihood(behind, y), expected, rtol=1e-12)

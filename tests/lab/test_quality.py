@@ -27,7 +27,6 @@ from kfcourse.lab.quality import (
 )
 from kfcourse.lab.variants import STEPS
 from kfcourse.montecarlo import BATCHES, FEWEST
-from kfcourse.montecarlo.statistics import Sums
 
 SHIPPED = load_variants()
 
@@ -144,8 +143,7 @@ def test_long_formulas_are_refused():
 def test_a_filter_diverges_at_ten_times_the_variance_of_the_state():
     x = np.random.default_rng(1).normal(size=(1, BATCHES, 1))
     for times, diverges in ((8, False), (12, True)):
-        sums = Sums.empty(1, 1, 1, BATCHES)
-        sums.weight[:], sums.square[:] = 1, times * x.var()
+        sums = {"weight": np.ones(BATCHES), "square": np.full((1, 1, 1, BATCHES), times * x.var())}
         result = Comparison(SHIPPED["53"].model, ("duof",), BATCHES, 1, 1, sums)
         assert bool(not_diverging(result, x)) == diverges
 

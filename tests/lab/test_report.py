@@ -457,10 +457,10 @@ def test_a_filter_that_a_few_trajectories_take_far_beyond_the_others_is_said_to_
     model = VARIANTS["53"].model
     for everywhere in (False, True):
         result = compared(model, ["aof-gaussian", "duof"], 400, 3)
-        result.sums.square[1, 2] *= 1000
-        result.sums.largest[:] = 0
+        result.sums["square"][1, 2] *= 1000
+        result.sums["largest"][:] = 0
         if not everywhere:
-            result.sums.largest[1, 2] = 0.5 * result.sums.square[1, 2].sum()
+            result.sums["largest"][1, 2] = 0.5 * result.sums["square"][1, 2].sum()
         result_ = " ".join(remarks_in_words(result))
         assert ("DUOF: at step 2 the error variance is more than a hundred times" in result_) == (
             not everywhere

@@ -99,3 +99,14 @@ def test_a_start_without_a_likelihood_says_why():
     model = Model.define("x", "g*x", {"g": 1.0}, prior={"mean": 1, "variance": 0})
     with pytest.raises(ValueError, match="no density for the measurement of step 0"):
         estimate(model, np.ones((3, 1, 1)), ["g"])
+
+
+def test_a_search_that_leaves_the_model_names_the_parameter():
+    """White measurements of a walk: its variance q goes to zero, and beyond there is no model."""
+    walk = Model.define(
+        "x + v", "x + w", {"q": 1.0}, state_noise={"variance": "q"}, prior={"variance": 10}
+    )
+    y = np.random.default_rng(0).standard_normal((50, 1, 1))
+    with pytest.raises(ValueError, match=r"a small change of q leaves no.*: declare q positive"):
+        estimate(walk, y, ["q"])
+    assert 0 < estimate(walk, y, ["q"], ["q"]).value < 0.1

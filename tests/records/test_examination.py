@@ -35,14 +35,13 @@ def test_the_parts_are_those_of_the_package():
     assert set(examined.weight[~np.isnan(examined.weight)]) == {1.0}
 
 
-@pytest.mark.parametrize("by_component", [False, True])
 @pytest.mark.parametrize("edge", [1.0, 0.999, 0.99])
-def test_the_intervals_cover(edge, by_component):
+def test_the_intervals_cover(edge):
     """300 records of 60 steps, a fifth of the cells empty: 95 % with a standard error of 1.3 %."""
     y, filter_ = holed(60, 300, 7), aof(STRUCTURE)
     # with a narrower gate what it refuses, large in truth, makes the prediction after it too sure
     if edge < 1:
-        filter_ = gated(filter_, edge, patience=None, by_component=by_component)
+        filter_ = gated(filter_, edge, patience=None)
     examined = examine(filter_, y)
     # not those whose track was lost
     kept = [run for run in range(300) if (examined.weight[:, run] > 0).sum() > 30]

@@ -770,7 +770,7 @@
       : slip.order ? `: it takes a moment of order ${slip.order} for another one` : "";
     if (slip.above) {
       const term = textAbove ? shown(textAbove, at(above, named(above, slip.path))) : "";
-      return [`what has been made of ${term ? `\`${term}\` of the line above` : "a term of the definition"} is not right${moment}`, term];
+      return `what has been made of ${term ? `\`${term}\` of the line above` : "a term of the definition"} is not right${moment}`;
     }
     const place = named(line, slip.path), term = shown(text, at(line, place)), { name } = slip;
     const role = setting.means.includes(name) ? "a mean" : setting.cov.some((row, i) => row[i] === name) ? "a variance"
@@ -789,7 +789,7 @@
       extra: name ? `something in \`${term}\` does not belong there` : `\`${term}\` does not belong there`,
       lost: `a term is lost${lost}, in \`${term}\``,
     };
-    return [says[slip.kind], term];
+    return says[slip.kind];
   }
 
   function ruleOf(texts, setting, slip, line, above, name) {
@@ -889,7 +889,7 @@
     }
     const meant = Boolean(setting.meanings[name]);
     let previous = meant ? letter(name) : null, above = meant || name ? "" : first.text, right = previous, broken = 0;
-    const say = (link, status, says = "", more = {}) => verdicts.push({ ...link, status, says, kinds: [], terms: [], spans: [], rule: "", ...more });
+    const say = (link, status, says = "", more = {}) => verdicts.push({ ...link, status, says, kinds: [], spans: [], rule: "", ...more });
     for (const link of name ? rest : chain.links) {
       let node;
       try {
@@ -930,11 +930,10 @@
       } else {
         const slips = findSlips(setting, node, previous);
         const said = slips.map((slip) => told(setting, slip, link.text, node, above, previous));
-        const says = said.length ? `the line differs from ${where}: ${said.map(([words]) => words).join(" or ")}`
+        const says = said.length ? `the line differs from ${where}: ${said.join(" or ")}`
           : `It is not equal to ${where}, and no single change explains it: was more than one step taken at once?`;
         say(link, "differs", says, {
           kinds: slips.map((slip) => slip.kind),
-          terms: said.map(([, term]) => term),
           spans: slips.filter((slip) => !slip.above).map((slip) => at(node, named(node, slip.path)).span).filter(Boolean),
           rule: ruleOf(texts, setting, slips[0], node, previous, key),
         });

@@ -56,7 +56,7 @@ const kfServe = () => {
 if (typeof document === "undefined") kfServe();
 
 const kfLiveLab = (root, name, given) => {
-  const { styles, titles, runs, steps, reach } = given, names = Object.keys(styles);
+  const { looks, runs, steps, reach } = given, names = Object.keys(looks);
   const MINUS = "\u2212", SPACE = "\u00a0";
   const thousands = (number) => (number < 10000 ? `${number}` : number.toLocaleString("en"));
   const key = (variant, parameter) => `${variant}.${parameter}`;
@@ -71,7 +71,7 @@ const kfLiveLab = (root, name, given) => {
   kfFigure(root, name, defaults, (ui) => {
     const chosen = ui.row(), sliders = ui.row(), keys = ui.row("kf-lines"), main = ui.row("kf-charts"), status = ui.says(), table = ui.row("kf-numbers");
     const looking = ui.row(), charts = ui.row("kf-charts");
-    ui.legend([...names.map((one) => ({ label: titles[one], ...styles[one] })), { label: "exact filter; truth", colour: "#1f2328" }], keys);
+    ui.legend([...Object.values(looks), { label: "exact filter; truth", colour: "#1f2328" }], keys);
     ui.choice(chosen, "variant", { label: "Variant", options: Object.keys(kfModels).sort((a, b) => a - b).map((one) => [one, given.variants[one]]) });
     ui.slider(chosen, "seed", { label: "Random numbers", low: 1, high: 50, step: 1, say: String });
     ui.slider(looking, "step", { label: "Step k", low: 0, high: steps - 1, step: 1, say: String });
@@ -95,13 +95,13 @@ const kfLiveLab = (root, name, given) => {
     const density = ui.chart(charts, { title: "What the exact filter knows at step k", x: { label: "state x" }, y: { label: "density" }, left: 64, says: "The exact posterior density at the chosen step, the Gaussian filter's normal density, the truth and the estimates." });
     const gains = ui.chart(charts, { title: "Gain at step k", x: { label: "prediction λ" }, y: { label: "gain dz/dy" }, says: "The gain of each filter against its prediction." });
     const functions = ui.chart(charts, { title: "Structural function", x: { label: "mean" }, y: { label: "value" }, left: 64, says: "The chosen structural function against the mean: Gaussian solid, linearised dashed." });
-    const of = (chart, more = {}) => Object.fromEntries(names.map((one) => [one, chart.curve({ ...styles[one], ...more })]));
-    const bands = Object.fromEntries(names.map((one) => [one, gap.band({ colour: styles[one].colour, opacity: 0.13 })]));
+    const of = (chart, more = {}) => Object.fromEntries(names.map((one) => [one, chart.curve({ ...looks[one], ...more })]));
+    const bands = Object.fromEntries(names.map((one) => [one, gap.band({ colour: looks[one].colour, opacity: 0.13 })]));
     const lines = { gap: of(gap), size: of(size), track: of(track, { width: 1.4 }), gains: of(gains) };
     const bound = size.curve({ width: 1.4 }), zero = gap.curve({ width: 1 }), truth = track.curve({ width: 2.4 }), known = track.curve({ width: 1.2, dash: "2 2" }), here = track.curve({ width: 1, dash: "2 3" });
-    const posterior = density.curve({ width: 2 }), normal = density.curve({ ...styles["aof-gaussian"], width: 1.4 }), at = density.curve({ width: 1.2, dash: "4 3" });
-    const places = Object.fromEntries(names.map((one) => [one, density.dots({ colour: styles[one].colour, size: 4 })]));
-    const exactly = functions.curve({ ...styles["aof-gaussian"] }), tangent = functions.curve({ ...styles["aof-linearised"] });
+    const posterior = density.curve({ width: 2 }), normal = density.curve({ ...looks["aof-gaussian"], width: 1.4 }), at = density.curve({ width: 1.2, dash: "4 3" });
+    const places = Object.fromEntries(names.map((one) => [one, density.dots({ colour: looks[one].colour, size: 4 })]));
+    const exactly = functions.curve({ ...looks["aof-gaussian"] }), tangent = functions.curve({ ...looks["aof-linearised"] });
     track.handle({
       keys: { x: "step" }, range: { x: [0, steps - 1] }, step: { x: 1 }, name: "Step to look at", value: ({ step }) => `step ${step}`,
       place: ({ step }) => [step, result ? result.track.x[step] : 0],
@@ -199,7 +199,7 @@ const kfLiveLab = (root, name, given) => {
       const shown = result && bounds && bounds.number === result.number;
       const rows = names.map((one) => {
         const value = result?.errors[one][step][0], part = shown ? percent(...bounds.above[one][step]) : "…";
-        return `<tr><th scope="row">${titles[one]}</th><td>${!result ? "…" : isFinite(value) ? ui.short(value) : "diverges"}</td><td>${part}</td></tr>`;
+        return `<tr><th scope="row">${looks[one].label}</th><td>${!result ? "…" : isFinite(value) ? ui.short(value) : "diverges"}</td><td>${part}</td></tr>`;
       });
       table.innerHTML = `<table class="table"><thead><tr><th scope="col">step ${step}</th><th scope="col">error variance</th><th scope="col">above the bound (%)</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
     };

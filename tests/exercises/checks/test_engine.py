@@ -10,7 +10,7 @@ from tiny import FORMULA, SUM, about, asks, c, d, outcome, p, raises, x, y, z
 
 from kfcourse.exercises.checks.engine import check
 from kfcourse.exercises.checks.equality import Unusable, equal, equal_formulas, like
-from kfcourse.exercises.checks.question import MIME, Question, catalogue
+from kfcourse.exercises.checks.question import MIME, Mistake, Question
 
 pytestmark = pytest.mark.quick
 
@@ -63,19 +63,19 @@ def test_parameters_have_the_sign_of_their_values():
 
 
 def test_parts_are_told_apart():
-    mistakes = catalogue((("both", "squared", lambda a, b: (a**2, b**2)),))
+    mistakes = [Mistake("both", "squared", lambda a, b: (a**2, b**2))]
     question = asks(lambda a, b: (a, b), SUM.arguments(None), mistakes, ("first", "second"))
     result = outcome(question, lambda a, b: (a, b**2))
     assert (result.diagnosis, result.share) == (("both",), 0.5)
     assert result.message == "first right, the rest not. second: squared"
-    assert outcome(question, lambda a, b: (a, -b)).diagnosis == ("sign",)
+    assert outcome(question, lambda a, b: (a, -b)).diagnosis == ("wrong-sign",)
     for answer, share in ((lambda a, b: (a, b), 1), (lambda a, b: (b, a), 0), (lambda a, b: 1, 0)):
         assert outcome(question, answer).share == share
 
 
 def test_right_for_some_inputs_only():
     result = outcome(SUM, lambda a, b: a + 2 * b if a[0] == 1.0 else a)
-    assert result.diagnosis == ("sometimes",)
+    assert result.diagnosis == ("right-for-some-inputs",)
     assert "1 of 2" in result.message
 
 
@@ -111,12 +111,14 @@ def test_numbers_in_the_place_of_parameters_are_told():
     exercise = about({c: sp.Rational(-1, 2)})
     for answer in (lambda a: (-a / 2, a + 0.25), lambda a: (c * a, a + 0.25)):
         result = check(question, exercise, answer)
-        assert (result.status, result.diagnosis) == ("wrong", ("numbers",)), result
+        assert (result.status, result.diagnosis) == ("wrong", ("numbers-for-symbols",)), result
     assert check(question, exercise, lambda a: (c * a, (a * c + c**3) / c)).passed
     # right by chance
-    assert check(question, exercise, lambda a: (c * a, a - c / 2)).diagnosis != ("numbers",)
+    assert check(question, exercise, lambda a: (c * a, a - c / 2)).diagnosis != (
+        "numbers-for-symbols",
+    )
     of_argument = asks(lambda a: 2 * a, [(c,)])  # an argument with the name of a parameter is none
-    assert check(of_argument, exercise, lambda a: -1).diagnosis != ("numbers",)
+    assert check(of_argument, exercise, lambda a: -1).diagnosis != ("numbers-for-symbols",)
 
 
 def test_like_keeps_numbers_and_shapes():

@@ -86,50 +86,55 @@ DIVIDED = pair(Mistake("divided", "It is divided.", lambda a, b: (a + b, a / b))
 
 # Question, answer, what it is named, and words of the message.
 WRONG = [
-    (NUMBERS, lambda a: -a, "sign", ""),
-    (NUMBERS, lambda a: a / 2, "factor-2", ""),
-    (NUMBERS, lambda a: 2 * a, "factor-half", ""),
+    (NUMBERS, lambda a: -a, "wrong-sign", ""),
+    (NUMBERS, lambda a: a / 2, "half-of-it", ""),
+    (NUMBERS, lambda a: 2 * a, "twice-of-it", ""),
     (NUMBERS, lambda a: 1 / a, "inverse", ""),
     (MATRIX, lambda a: a.T, "transposed", ""),
     (SYMBOLS, lambda a: a.T, "transposed", ""),
-    (CARRIED, lambda A, P: A.T @ P @ A, "scalars-only", ""),
-    (CARRIED, lambda A, P: A @ A.T, "unused", ""),
+    (CARRIED, lambda A, P: A.T @ P @ A, "right-for-scalars-only", ""),
+    (CARRIED, lambda A, P: A @ A.T, "argument-unused", ""),
     (CARRIED, lambda A, P: A @ P @ A.T + A, "not-symmetric", ""),
-    (CARRIED, lambda A, P: P, "unchanged", ""),
+    (CARRIED, lambda A, P: P, "argument-unchanged", ""),
     (CARRIED, lambda A, P: A @ P @ A.T - 50 * P, "negative-variance", ""),
-    (CARRIED, lambda A, P: carried(A, P).astype(np.float32), "precision", "(float32)"),
-    (FILTERED, lambda y, gain: gain * y, "from-second-step", ""),
-    (FILTERED, lambda y, gain: 3 * filtered(y, gain), "factor", ""),
-    (FILTERED, lambda y, gain: 3 + filtered(y, gain), "term", ""),
+    (CARRIED, lambda A, P: carried(A, P).astype(np.float32), "low-precision", "(float32)"),
+    (FILTERED, lambda y, gain: gain * y, "wrong-from-second-step", ""),
+    (FILTERED, lambda y, gain: 3 * filtered(y, gain), "wrong-factor", ""),
+    (FILTERED, lambda y, gain: 3 + filtered(y, gain), "wrong-term", ""),
     (pair(), lambda a, b: (a * b, a + b), "swapped", ""),
     (pair(), lambda a, b: (a + b, a + b), "another-result", ""),
     (FORMULAS, lambda z, p: (c**2 * p + e**2, c * z), "swapped", ""),
-    (FORMULAS, lambda z, p: (c * z, p + e**2), "unused", ""),
-    (FORMULAS, lambda z, p: (c * z, c**2 * p + e**2 * z), "superfluous", ""),
-    (ENTRY, lambda z: sp.Matrix([[z, 1], [0, 2 * z]]), "entries", "row 2, column 2"),
+    (FORMULAS, lambda z, p: (c * z, p + e**2), "argument-unused", ""),
+    (FORMULAS, lambda z, p: (c * z, c**2 * p + e**2 * z), "symbol-superfluous", ""),
+    (ENTRY, lambda z: sp.Matrix([[z, 1], [0, 2 * z]]), "some-entries-wrong", "row 2, column 2"),
     # the mistake that spoils least of what is right, and explains most of what is wrong
     (LEAST, lambda a: (a, 2 * a, a**3), "most", ""),
     # many numbers that agree in the first call that is wrong are no coincidence
     (squared(np.array([2.0, 2.0, 2.0])), lambda a: 2 * a, "squared", ""),
-    (RAMP, lambda a: a * STEPS + (STEPS > 0) * np.cos(a * STEPS), "from-second-step", ""),
+    (RAMP, lambda a: a * STEPS + (STEPS > 0) * np.cos(a * STEPS), "wrong-from-second-step", ""),
     # what is but rounding is zero
-    (of_many(lambda a: a.var()), lambda a: (a - a.mean()).mean(), "vanishing", ""),
-    (asks(lambda z: e * z, [(z,)]), lambda z: z - z, "vanishing", ""),
+    (of_many(lambda a: a.var()), lambda a: (a - a.mean()).mean(), "is-zero", ""),
+    (asks(lambda z: e * z, [(z,)]), lambda z: z - z, "is-zero", ""),
     # roots and squares are not always deviations
-    (of_many(np.exp), lambda a: np.exp(a / 2), "root", "of what it should be, as a"),
-    (of_many(np.exp), lambda a: np.exp(2 * a), "square", "of what it should be, as a"),
-    (CEILING, lambda a, n: np.ceil(3 * a), "unused", ""),
-    (LAW, lambda *values: np.round(of_law(*values), 2), "precision", "rounded"),
-    (LAW, lambda a, *rest: of_law(a, *rest) - a[0], "term", "one number for the whole"),
+    (of_many(np.exp), lambda a: np.exp(a / 2), "root-of-it", "of what it should be, as a"),
+    (of_many(np.exp), lambda a: np.exp(2 * a), "square-of-it", "of what it should be, as a"),
+    (CEILING, lambda a, n: np.ceil(3 * a), "argument-unused", ""),
+    (LAW, lambda *values: np.round(of_law(*values), 2), "low-precision", "rounded"),
+    (LAW, lambda a, *rest: of_law(a, *rest) - a[0], "wrong-term", "one number for the whole"),
     (
         formulas(lambda z, p: c**2 * p + e**2 * (1 + sp.cos(2 * z)) / 2),
         lambda z, p: c**2 * p + e**2 * sp.cos(z) ** 2 + sp.exp(c * e * p * z),
-        "terms",
+        "some-terms-wrong",
         "c**2*p is right; look at the rest.",
     ),
-    (TWO, lambda z, p: (3 * e * sp.cos(z), p * z), "factor", "a factor that is a number"),
-    (TWO, lambda z, p: (e * sp.cos(z), p * z**3), "factor", "a factor that depends on z only"),
-    (pair(), lambda a, b: (a + b, a * b**3), "factor", "the square of the argument `b`"),
+    (TWO, lambda z, p: (3 * e * sp.cos(z), p * z), "wrong-factor", "a factor that is a number"),
+    (
+        TWO,
+        lambda z, p: (e * sp.cos(z), p * z**3),
+        "wrong-factor",
+        "a factor that depends on z only",
+    ),
+    (pair(), lambda a, b: (a + b, a * b**3), "wrong-factor", "the square of the argument `b`"),
 ]
 
 
@@ -160,10 +165,10 @@ NOT_SO = [
     # 2^2 = 2 * 2 says nothing
     (squared(2.0), lambda a: 2 * a, "squared"),
     # most later steps are right
-    (RAMP, lambda a: a * STEPS + (STEPS > 6) * a**2, "from-second-step"),
-    (asks(lambda a: 0 * a, [(MANY,)]), lambda a: a, "vanishing"),
+    (RAMP, lambda a: a * STEPS + (STEPS > 6) * a**2, "wrong-from-second-step"),
+    (asks(lambda a: 0 * a, [(MANY,)]), lambda a: a, "is-zero"),
     # what is rounded up depends on its arguments
-    (CEILING, lambda a, n: np.ceil(0.03 * a) + n, "unused"),
+    (CEILING, lambda a, n: np.ceil(0.03 * a) + n, "argument-unused"),
     # no covariance: what is subtracted from one
     (asks(lambda P: -P, [(P,), (2 * P,)]), lambda P: -P - np.eye(3), "negative-variance"),
 ]
@@ -230,15 +235,15 @@ def mixed(a, b):
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("inner-sign", "a + 2", "a - 2"),
-        ("quotient", "/ np", "* np"),
+        ("one-sign-wrong", "a + 2", "a - 2"),
+        ("product-for-quotient", "/ np", "* np"),
         ("term-lost", " + 3", ""),
         ("power-lost", " ** 2", ""),
         ("function-lost", "np.sqrt", ""),
         ("factor-lost", "np.sin(a + 2) / ", "1 / "),
-        ("number", "3", "4"),
-        ("letter", "(b + 2)", "(a + 2)"),
-        ("order", "a + 1, b + 2", "b + 2, a + 1"),
+        ("other-number", "3", "4"),
+        ("other-letter", "(b + 2)", "(a + 2)"),
+        ("other-order", "a + 1, b + 2", "b + 2, a + 1"),
     ],
 )
 def test_one_thing_changed_in_the_key_is_named(name, old, new):
@@ -287,5 +292,5 @@ def test_what_is_not_finite_does_not_reach_lapack(capfd):
         [(np.float64(0.5),), (np.float64(2.0),)],
     )
     wrong = outcome(fitted, lambda a: np.array([1.0, 2.0]))
-    assert wrong.diagnosis == ("unused",)
+    assert wrong.diagnosis == ("argument-unused",)
     assert capfd.readouterr() == ("", "")

@@ -11,7 +11,7 @@ from tiny import asks, outcome, p, raises, z
 from weekly import weekly
 
 from kfcourse.exercises.checks import engine
-from kfcourse.exercises.checks.question import catalogue
+from kfcourse.exercises.checks.question import Mistake
 
 
 class Evil:
@@ -108,9 +108,7 @@ KINDS = {
     "formulas": asks(
         lambda z, p: (sp.sin(z), z**2 * p + 1),
         [(z, p)],
-        catalogue(
-            [("noise-forgotten", "the noise is missing", lambda z, p: (sp.sin(z), z**2 * p))]
-        ),
+        [Mistake("noise-forgotten", "the noise is missing", lambda z, p: (sp.sin(z), z**2 * p))],
         ("tau", "Theta"),
     ),
     "matrices": asks(

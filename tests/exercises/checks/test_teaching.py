@@ -9,8 +9,8 @@ import sympy as sp
 from tiny import NOTHING, about, asks, c, d, outcome, p, x, y, z
 
 from kfcourse.exercises.checks.diagnosis import GENERAL
-from kfcourse.exercises.checks.engine import check
-from kfcourse.exercises.checks.question import MIME, Attempts, Question, catalogue
+from kfcourse.exercises.checks.engine import FOLLOWS, check
+from kfcourse.exercises.checks.question import MIME, Attempts, Mistake, Question
 
 pytestmark = pytest.mark.quick
 
@@ -50,7 +50,7 @@ def test_the_case_of_a_run_is_the_first_that_is_wrong():
 
 
 def test_the_same_wrong_answer_again_gets_a_stronger_hint():
-    mistakes = catalogue((("minus", "the sign of b", lambda a, b: a - b),))
+    mistakes = [Mistake("minus", "the sign of b", lambda a, b: a - b)]
     question = asks(lambda a, b: a + b, [(2.5, 1.5)], mistakes, advice="Think of b.")
     past = Attempts()
 
@@ -102,7 +102,7 @@ def test_a_right_step_on_a_wrong_one_is_marked_and_said():
 
     assert asked("t1", own).status == "wrong"
     result = asked("t2", lambda a: 14 * a)
-    assert (result.status, result.follows, result.diagnosis) == ("wrong", ("t1",), ("follows",))
+    assert (result.status, result.follows, result.diagnosis) == ("wrong", ("t1",), (FOLLOWS,))
     assert "right on top of your t1" in result.message
     assert result._repr_mimebundle_()[MIME]["follows"] == ["t1"]
     assert asked("t2", lambda a: 15 * a).follows == ()

@@ -33,16 +33,15 @@ from kfcourse.exercises.grading import course, marking, pool, sandbox, submissio
 from kfcourse.exercises.grading.assembly import assembled
 from kfcourse.exercises.grading.marking import code_of
 from kfcourse.exercises.grading.results import Grade, read_lines
-from kfcourse.exercises.grading.running import Site
 from kfcourse.exercises.grading.sandbox import Sandbox
 from kfcourse.exercises.grading.submissions import Cell, Unreadable, cells_of, claimed
 from kfcourse.exercises.notebooks.course_list import Student
 from kfcourse.exercises.notebooks.master import read, render, solution, student
 
 SECONDS = 15  # of a cell; the endless loop below takes so long
-SETTING = marking.Setting(Site(Path("stage"), Sandbox("none")), "salt")
-MARKS = {
-    f"b{i}": mark
+SETTING = marking.Setting(Sandbox("none", Path("stage")), "salt")
+RESULTS = {
+    f"b{i}": Result(f"b{i}", "", mark, "")
     for i, mark in enumerate(("passed", "wrong", "unusable", "not implemented", "not run"), 1)
 }
 BOTH, NEW, WRONG = (("passed",) * 2, ("not implemented",) * 2, ("wrong",) * 2)
@@ -325,7 +324,7 @@ def test_what_the_command_says(graded):
 def test_what_was_stopped_is_told_the_student_and_leaves_nothing(graded):
     grades = read_lines(graded.folder.parent / "returned-grades.jsonl").values()
     (looped,) = [grade for grade in grades if grade.name == "loops.ipynb"]
-    assert looped.comments["b2"].says == f"not run. {looped.note}"
+    assert looped.results["b2"].message == f"not run. {looped.note}"
     assert ended(int((graded.folder.parent / "pid").read_text()))
 
 
@@ -362,20 +361,20 @@ def test_what_the_student_reads(graded_here):
     """A step on the student's own wrong one, right parts, an error in a cell before it, a cell that is
     gone."""
 
-    def comments(name):
-        return graded_here(IN_PROCESS[name][0]()).comments
+    def results(name):
+        return graded_here(IN_PROCESS[name][0]()).results
 
     follows = graded_here(solved(NOT_DIVIDED))
     assert "b2: right on top of an earlier wrong answer" in follows.note
-    comment = follows.comments["b2"]
-    assert (comment.follows, comment.share) == (("b1",), 0.0)
-    assert "right on top of your b1" in comment.says
+    result = follows.results["b2"]
+    assert (result.follows, result.share) == (("b1",), 0.0)
+    assert "right on top of your b1" in result.message
     half = graded_here(solved(("def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi")))
-    assert (half.marks["b2"], half.comments["b2"].share) == ("wrong", 0.5)
-    assert comments("is no Python")["b1"].says == f"not run. {DEFINED}"
-    gone = comments("a cell is gone")
-    assert gone["b1"].says == "its cell is gone from the notebook"
-    assert gone["b2"].says.endswith("or stands on what is not there: the cell of b1")
+    assert (half.marks["b2"], half.results["b2"].share) == ("wrong", 0.5)
+    assert results("is no Python")["b1"].message == f"not run. {DEFINED}"
+    gone = results("a cell is gone")
+    assert gone["b1"].message == "its cell is gone from the notebook"
+    assert gone["b2"].message.endswith("or stands on what is not there: the cell of b1")
 
 
 def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here, monkeypatch):
@@ -390,7 +389,7 @@ def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here, monke
     grade = graded_here(solved())
     assert (grade.marks["b1"], grade.marks["b2"]) == ("not graded", "passed")
     assert (grade.status, grade.digest) == ("graded in part", "")
-    assert grade.comments["b1"].says == marking.LOOKED_AT
+    assert grade.results["b1"].message == marking.LOOKED_AT
     note = "look: b1 not graded: the check itself fails, please tell us: AttributeError: of ours"
     assert grade.note == note
 
@@ -430,7 +429,7 @@ def without_running(monkeypatch):
 
     def instead(works, *_):
         ran.extend(work.name.removesuffix(".ipynb") for work in works)
-        fields = ("graded", "b", "53", MARKS, ("anew",), ())
+        fields = ("graded", "b", "53", RESULTS, ("anew",), ())
         return [Grade(work.name, *fields, work.digest) for work in works]
 
     monkeypatch.setattr(pool, "graded", instead)

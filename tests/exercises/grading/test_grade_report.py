@@ -8,11 +8,11 @@ from dataclasses import replace
 import markupsafe
 import pytest
 
-from kfcourse.exercises.checks import sets
+from kfcourse.exercises.checks import Result, sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WEIGHTS, WRONG
 from kfcourse.exercises.grading.owners import Person, owner, people, same_code
 from kfcourse.exercises.grading.report import feedback, student_rows, write_report
-from kfcourse.exercises.grading.results import NOT_RUN, Comment, Grade
+from kfcourse.exercises.grading.results import NOT_RUN, Grade
 from kfcourse.exercises.grading.weights import USUAL, Credit, points, possible
 from kfcourse.exercises.notebooks.course_list import Student, read_assignment, save_assignment
 
@@ -27,14 +27,21 @@ SIGN = next(
     for mistake in question.mistakes
     if (question.name, mistake.name) == ("b2", "innovation-sign")
 )
-EVERYTHING = {question.name: PASSED for question in sets()["b"].questions}
+EVERYTHING = [question.name for question in sets()["b"].questions]
+
+
+def outcome(mark, message="", diagnosis=(), **more):
+    return Result("", "", mark, message, diagnosis, **more)
+
+
+def wrong(message="no", *diagnosis, **more):
+    return outcome(WRONG, message, diagnosis, **more)
 
 
 def graded(name, letter="b", variant="53", passed=(), student="", work="w", looks=(), **wrong):
-    marks = {question.name: NOT_RUN for question in sets()[letter].questions}
-    marks |= dict.fromkeys(passed, PASSED) | dict.fromkeys(wrong, WRONG)
-    comments = dict.fromkeys(passed, Comment("right")) | wrong
-    return Grade(name, "graded", letter, variant, marks, (), looks, name, comments, student, work)
+    results = {question.name: outcome(NOT_RUN) for question in sets()[letter].questions}
+    results |= dict.fromkeys(passed, outcome(PASSED)) | wrong
+    return Grade(name, "graded", letter, variant, results, (), looks, name, student, work)
 
 
 @pytest.mark.quick
@@ -69,7 +76,7 @@ def test_what_to_look_at():
         graded("РТ-1/Петрова Анна/c.ipynb", "c", variant="20", passed=["c1"], work="y"),
         graded("РТ-1/Петрова Анна/c (1).ipynb", "c", variant="20", passed=["c1", "c2"], work="z"),
         Grade("РТ-2/Иванов Иван/b.ipynb", "not graded", notes=("it killed its process",)),
-        Grade("РТ-2/Иванов Иван/c.ipynb", "graded", "c", marks={"c1": MISSING}),
+        Grade("РТ-2/Иванов Иван/c.ipynb", "graded", "c", results={"c1": outcome(MISSING)}),
         Grade("x.ipynb", "not graded", notes=("not JSON",)),
         Grade("notes.ipynb", "not an exercise notebook"),
     ]
@@ -103,8 +110,8 @@ def test_without_a_list_a_folder_is_a_student():
 @pytest.mark.quick
 def test_points_are_the_weights_of_the_levels():
     assert possible("abc") == sum(possible("abc", level) for level in WEIGHTS)
-    assert points([Grade("x", "graded", "b", marks=EVERYTHING)], USUAL) == possible("b")
-    grade = Grade("x", "graded", "b", marks=EVERYTHING | {"b1": WRONG, "b2": UNUSABLE})
+    assert points([graded("x", passed=EVERYTHING)], USUAL) == possible("b")
+    grade = graded("x", passed=EVERYTHING, b1=wrong(), b2=outcome(UNUSABLE))
     assert points([grade], USUAL) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
 
 
@@ -122,10 +129,10 @@ def test_what_a_wrong_answer_is_worth_is_the_teachers_choice(credit, expected):
     """b2 has a third of its results right, b3 is right on top of the wrong b1, b4 both."""
     grade = graded(
         "x",
-        b1=Comment("no"),
-        b2=Comment("no", share=1 / 3),
-        b3=Comment("no", follows=("b1",)),
-        b4=Comment("no", share=0.25, follows=("b2",)),
+        b1=wrong(),
+        b2=wrong(share=1 / 3),
+        b3=wrong(follows=("b1",)),
+        b4=wrong(share=0.25, follows=("b2",)),
     )
     assert points([grade], credit) == pytest.approx(expected, abs=0.01)
     assert points([grade], credit, "core") == points([grade], credit)
@@ -134,7 +141,7 @@ def test_what_a_wrong_answer_is_worth_is_the_teachers_choice(credit, expected):
     assert (row["set b"], row["points"], row["of"]) == (total, total, possible("b"))
     half = f"{credit.parts * 2 / 3:.2f}".rstrip("0").rstrip(".")
     assert f"{half}/2" in feedback(Person(IVANOV, {"b": grade}), "b", credit)
-    unusable = replace(grade, marks=dict.fromkeys(grade.marks, UNUSABLE))
+    unusable = replace(grade, results=dict.fromkeys(grade.results, outcome(UNUSABLE, share=0.5)))
     assert points([unusable], credit) == 0  # only what is wrong has right parts
 
 
@@ -143,10 +150,10 @@ def table(path):
 
 
 def test_tables_and_pages(tmp_path):
-    wrong = Comment("not right. The `sign`: <b>look</b>", ("innovation-sign",))
+    sign = wrong("not right. The `sign`: <b>look</b>", "innovation-sign")
     grades = [
-        graded("РТ-1/Иванов Иван/b.ipynb", passed=["b1", "b5"], b2=wrong, b3=Comment("not right.")),
-        graded("РТ-1/Петрова Анна/b.ipynb", variant="20", passed=["b1"], b2=wrong),
+        graded("РТ-1/Иванов Иван/b.ipynb", passed=["b1", "b5"], b2=sign, b3=wrong()),
+        graded("РТ-1/Петрова Анна/b.ipynb", variant="20", passed=["b1"], b2=sign),
     ]
     persons = write_report(grades, COURSE, tmp_path, "bubblewrap")
     rows = table(tmp_path / "students.csv")

@@ -9,7 +9,6 @@ from inside import InsideKernel, statuses
 
 from kfcourse.exercises.checks import sets
 from kfcourse.exercises.grading import marking, submissions
-from kfcourse.exercises.grading.running import Site
 from kfcourse.exercises.grading.sandbox import Sandbox
 
 FOLDER = Path(__file__).parent / "handed_out"
@@ -28,7 +27,7 @@ def test_every_cell_runs_up_to_the_first_stub(path):
 @pytest.mark.parametrize("name", ["b-aof.ipynb", "e-comparison.ipynb"])
 def test_they_are_graded(name):
     (work,) = (work for work in submissions.returned(FOLDER) if work.name == name)
-    setting = marking.Setting(Site(Path("stage"), Sandbox("none")), "salt")
+    setting = marking.Setting(Sandbox("none", Path("stage")), "salt")
     grade = marking.grade(work, setting, start=InsideKernel)
     assert (grade.status, grade.note, grade.student) == ("graded", "", "Иванов Иван, РТ-1")
     assert set(grade.marks.values()) == {"not implemented"}

@@ -5,6 +5,7 @@ import json
 import os
 import socket
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,11 +17,10 @@ from kfcourse.exercises.checks import Exercise, exercise, sets
 from kfcourse.exercises.grading import marking, pool, running, sandbox
 from kfcourse.exercises.grading.assembly import Step
 from kfcourse.exercises.grading.marking import Marking, Setting
-from kfcourse.exercises.grading.running import KILLED, Kernel, Opening, Site
+from kfcourse.exercises.grading.running import KILLED, Kernel
 from kfcourse.exercises.grading.sandbox import Sandbox
-from kfcourse.exercises.grading.staging import answers, personal_numbers, stage
+from kfcourse.exercises.grading.staging import answers, stage
 from kfcourse.exercises.grading.submissions import returned
-from kfcourse.exercises.notebooks.master import opened
 
 TASK = exercise("b", "53")
 B1 = TASK.questions["b1"]
@@ -56,20 +56,18 @@ def staged(tmp_path_factory):
 @pytest.fixture(scope="module")
 def box(tmp_path_factory, staged):
     """Bubblewrap's sandbox, or none where it does not work."""
-    if sandbox.problem(tmp_path_factory.mktemp("tried"), staged):
-        return Sandbox("none")
-    return Sandbox("bwrap", tuple(map(str, answers())))
+    box = Sandbox("bwrap", staged, tuple(map(str, answers())))
+    return replace(box, kind="none") if sandbox.problem(box) else box
 
 
-def kernel_in(sandbox, staged):
-    opening = Opening(TASK.letter, opened(TASK), personal_numbers(TASK))
-    return Kernel(Site(staged, sandbox), opening, 120.0)
+def kernel_in(box):
+    return Kernel(box, TASK, 120.0)
 
 
 @pytest.fixture(scope="module")
-def kernel(staged, box):
+def kernel(box):
     """One process for all tricks that leave it alive; the others end it, and it is started anew."""
-    with kernel_in(box, staged) as started:
+    with kernel_in(box) as started:
         marked(started, OPEN)
         yield started
 
@@ -78,7 +76,7 @@ def marked(kernel, *steps):
     """The result of b1 after these cells."""
     marking = Marking(TASK, SALT)
     marking.run(kernel, steps)
-    return marking.results.get("b1")
+    return marking.results["b1"]
 
 
 def test_later_steps_may_stand_on_earlier_answers(kernel):
@@ -101,7 +99,7 @@ def test_no_function_gets_more_than_it_deserves(kernel, box, name, monkeypatch):
     # and what comes after it is marked as if nothing had been
     kernel._done = [done for done in kernel._done if "gain" not in done["source"]]
     result = marked(kernel, RIGHT, CHECK)
-    assert result and result.passed, result
+    assert result.passed, result
 
 
 def test_an_endless_answer_is_ended_as_early_as_a_cell_and_the_time_said_is_its_own(
@@ -119,7 +117,7 @@ def test_no_cell_lets_a_wrong_answer_pass(kernel, name):
     """One after the other in the same process: what the earlier ones have changed stays changed."""
     wrong_gain = Step("def gain(Psi, G, F):\n    return G @ Psi", "answer")
     result = marked(kernel, wrong_gain, Step(CELLS[name], "trick"), CHECK)
-    assert result is None or result.status in ("wrong", "unusable", "not run")
+    assert result.status in ("wrong", "unusable", "not run")
 
 
 def test_arguments_learned_by_heart_would_pass_without_a_salt():
@@ -156,11 +154,11 @@ def test_what_the_masters_import_is_on_the_stage(staged):
         if line.startswith(("import ", "from "))
     }
     assert len(lines) > 10
-    with kernel_in(Sandbox("none"), staged) as kernel:
+    with kernel_in(Sandbox("none", staged)) as kernel:
         assert {line: error for line in lines if (error := kernel.cell(line).error)} == {}
 
 
-def test_a_sandbox_holds(staged, box, tmp_path, monkeypatch):
+def test_a_sandbox_holds(box, tmp_path, monkeypatch):
     """Everything at once, then a right answer: it passes, and nothing has happened outside."""
     if box.kind == "none":
         pytest.skip("no bubblewrap")
@@ -186,10 +184,9 @@ def test_a_sandbox_holds(staged, box, tmp_path, monkeypatch):
         }
         tricks = {name: filled(code, **values) for name, code in PROCESSES.items()} | own
         steps = [Step(code, name, own=True) for name, code in tricks.items()]
-        holds = Sandbox("bwrap", (*box.hidden, str(outside)))
-        with kernel_in(holds, staged) as kernel:
+        with kernel_in(replace(box, hidden=(*box.hidden, str(outside)))) as kernel:
             marking.run(kernel, [OPEN, *steps, RIGHT, CHECK])
-    assert marking.notes == [] and marking.marks["b1"] == "passed"
+    assert marking.notes == [] and marking.results["b1"].passed
     errors = " ".join(marking.errors)
     assert "AssertionError" not in errors, errors
     assert "imported: ModuleNotFoundError" in errors
@@ -201,7 +198,7 @@ def test_a_sandbox_holds(staged, box, tmp_path, monkeypatch):
 
 @pytest.fixture
 def grader(staged):
-    grader = pool.Grader(Setting(Site(staged, Sandbox("none")), SALT))
+    grader = pool.Grader(Setting(Sandbox("none", staged), SALT))
     yield grader
     grader.end()
 
@@ -225,10 +222,10 @@ STUB = "def gain(Psi, G, F):\n    import time\n    time.sleep(1)\n    raise NotI
 
 
 @POSIX
-def test_an_answer_whose_process_is_killed_is_not_graded(staged, box):
+def test_an_answer_whose_process_is_killed_is_not_graded(box):
     """It may be a stub that nobody has touched: what came of it must not count as an answer."""
     marking = Marking(TASK, SALT)
-    with kernel_in(box, staged) as kernel:
+    with kernel_in(box) as kernel:
         request = kernel._request
 
         def shot(message, *rest):
@@ -238,7 +235,7 @@ def test_an_answer_whose_process_is_killed_is_not_graded(staged, box):
 
         kernel._request = shot
         marking.run(kernel, [OPEN, Step(STUB, "x"), CHECK])
-    assert marking.marks["b1"] == "not graded" and KILLED in " ".join(marking.looks())
+    assert marking.results["b1"].status == "not graded" and KILLED in " ".join(marking.looks())
 
 
 def hangs(*_):

@@ -5,6 +5,7 @@ import io
 
 import pytest
 
+from kfcourse.exercises.checks import Result, sets
 from kfcourse.exercises.grading.report import write_report
 from kfcourse.exercises.grading.results import Grade, write_table
 from kfcourse.exercises.notebooks.course_list import Student, save_assignment
@@ -42,8 +43,10 @@ def test_no_table_holds_a_formula(tmp_path):
     """All four tables that the commands write."""
     students = [Student(text + "A", text + "1", text + "53", text + "b") for text in FORMULAS]
     save_assignment(students, tmp_path / "assignment.csv")
+    names = [question.name for question in sets()["b"].questions]
+    wrong = Result("", "", "wrong", "")
     grades = [
-        Grade(f"{t}.ipynb", "graded", "b", t, {"b1": "wrong"}, (t,), (t,), "d", {}, t, t)
+        Grade(f"{t}.ipynb", "graded", "b", t, dict.fromkeys(names, wrong), (t,), (t,), "d", t, t)
         for t in FORMULAS
     ]
     write_table(grades, tmp_path / "grades.csv")

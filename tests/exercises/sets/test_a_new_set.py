@@ -13,14 +13,14 @@ QUESTIONS = """
 from pathlib import Path
 
 from kfcourse.exercises.checks import ExerciseSet, Question
-from kfcourse.exercises.checks.question import catalogue
+from kfcourse.exercises.checks.question import Mistake
 
 
 def twice(x):
     return 2 * x
 
 
-QUESTION = Question("y1", "twice", "warm-up", twice, lambda e: [(3.0,)], catalogue([("once", "A factor.", lambda x: x)]))
+QUESTION = Question("y1", "twice", "warm-up", twice, lambda e: [(3.0,)], (Mistake("once", "A factor.", lambda x: x),))
 SET = ExerciseSet("y", "Doubling", Path(__file__).parent, (QUESTION,))
 """
 STATEMENT = """

@@ -6,6 +6,7 @@ from weekly import weekly
 
 from kfcourse.exercises.checks import Derivation, exercise, sets
 from kfcourse.exercises.checks.editing import rebound, uses
+from kfcourse.exercises.checks.engine import FOLLOWS
 from kfcourse.exercises.checks.question import ForVariant
 
 DEAR = {"f4-f2", "f4-f3"}  # the exact filter again for each mistake
@@ -61,7 +62,7 @@ def test_on_top_of_a_wrong_answer_the_right_step_follows(name, letter, question,
         result = task.check(question.name, built)
         if earlier.name in task.past.wrong and result.follows:
             assert result.follows == (earlier.name,)
-            assert (result.status, result.diagnosis) == ("wrong", ("follows",))
+            assert (result.status, result.diagnosis) == ("wrong", (FOLLOWS,))
             break
     else:
         pytest.fail(f"{name}: no mistake changes the step")
