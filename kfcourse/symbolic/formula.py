@@ -62,14 +62,15 @@ def symbol(name: str) -> sp.Symbol:
 
 def check_name(name: str) -> str:
     """Return `name` if it can name a parameter or variable in a formula; ModelError if not."""
-    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
+    if (
+        not isinstance(name, str)
+        or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name)
+        or keyword.iskeyword(name)
+        or name in FUNCTIONS | CONSTANTS
+    ):
         raise ModelError(
-            f"{name!r} cannot name a symbol: use letters, digits and _, a letter first"
-        )
-    if keyword.iskeyword(name) or name in FUNCTIONS | CONSTANTS:
-        raise ModelError(
-            f"{name!r} already means something in formulas or in Python; choose another name, such "
-            f"as {name}_"
+            f"{name!r} cannot name a symbol: use letters, digits and _, a letter first; no word "
+            f"that already means something in formulas or in Python"
         )
     return name
 

@@ -188,14 +188,16 @@ def _side(
     return regressed
 
 
-def _lower_root(cov: Array) -> tuple[Array, Array]:
+def _lower_root(cov: Array, unseen: float = UNSEEN) -> tuple[Array, Array]:
     """The Cholesky factor, and which components (..., n) are known: their columns are those of
     I."""
-    n = cov.shape[-1]
-    known = ~(np.diagonal(cov, axis1=-2, axis2=-1) > 0)
-    enlarged = cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n))
-    either = known[..., :, None] | known[..., None, :]
-    return np.linalg.cholesky(np.where(either, np.eye(n), enlarged)), known
+    n, variance = cov.shape[-1], np.diagonal(cov, axis1=-2, axis2=-1)
+    known = ~((variance > 0) & np.isfinite(cov).all(axis=-1))
+    enlarged = cov * (1 + (unseen if n > 1 else 0) * np.eye(n))
+    try:
+        return np.linalg.cholesky(np.where(known[..., :, None], np.eye(n), enlarged)), known
+    except np.linalg.LinAlgError:  # rounding has broken a covariance by more than that
+        return _lower_root(cov, 100 * unseen)
 
 
 def _checked(
