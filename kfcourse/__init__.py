@@ -19,10 +19,9 @@ from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.records import likelihood, read_measurements, smooth
-from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.model import AngleWarning, Model
 from kfcourse.symbolic.moments import GaussianMoments
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
 from kfcourse.symbolic.structure import Structure, gaussian, linearised

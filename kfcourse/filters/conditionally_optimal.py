@@ -15,7 +15,7 @@ from kfcourse.filters import notation as s
 from kfcourse.filters.base import State
 from kfcourse.filters.designed import Design, Equations, fitted_correction, fitted_prediction
 from kfcourse.laws import Array
-from kfcourse.symbolic.equations import Noiseless, compile_noiseless
+from kfcourse.symbolic.equations import Equation, compile_noiseless
 from kfcourse.symbolic.model import Model
 
 _omega, _eps = s.matrix(r"\omega_{k}", s.p, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
@@ -33,7 +33,7 @@ EQUATIONS = (
 )
 
 
-def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> Design:
+def duof(model: Model, equations: tuple[Equation, Equation] | None = None) -> Design:
     """The two-step conditionally optimal filter.
 
         omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: of x - lambda on omega

@@ -19,10 +19,10 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference
 from kfcourse.laws import Array, Gaussian, Measurement, log_density
-from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.sides import decides
 
 # states on which formulas are tried; eigenvalue of correlations that is none
 TRIALS, ROUNDING = 50, 1e-12

@@ -14,10 +14,10 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array, Matrices, Measurement, Vectors, apply, symmetric
-from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.sides import decides
 
 
 @dataclass(frozen=True)

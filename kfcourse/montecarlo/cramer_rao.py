@@ -29,9 +29,9 @@ from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.statistics import Estimate, means_without_each
-from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.sides import jumps
 
 # of one trajectory in a mean of information: where it is more, the mean is infinite, or as good as
 SHARE = 0.05

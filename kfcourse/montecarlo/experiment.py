@@ -33,7 +33,6 @@ from kfcourse.montecarlo.ensemble import Ensemble, Instant, check_finite, side_b
 from kfcourse.montecarlo.parallel import cluster
 from kfcourse.montecarlo.scores import scored
 from kfcourse.montecarlo.statistics import Sums, claimed
-from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
@@ -121,7 +120,6 @@ def measurements(filter_: Filter, y: Array) -> Array:
         raise ValueError(
             f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing"
         )
-    warn_of_degrees("a measurement", y, filter_.model.measured, filter_.model.angles.y)
     return y
 
 

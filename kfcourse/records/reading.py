@@ -27,7 +27,6 @@ import numpy as np
 from kfcourse.errors import expect
 from kfcourse.files import read_text
 from kfcourse.laws import Array
-from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 
@@ -138,7 +137,6 @@ def read_measurements(
             stacklevel=2,
         )
     y = np.stack([values[name] for name in model.measured], axis=-1)[:, None]
-    warn_of_degrees(f"{path}: a measurement", y, model.measured, model.angles.y)
     return Record(times, y, model.with_inputs(inputs))
 
 

@@ -16,15 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
 from kfcourse.errors import expect
-from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, transpose
-from kfcourse.symbolic.equations import Noiseless, compile_noiseless
+from kfcourse.laws import Array, product, transpose
+from kfcourse.symbolic.equations import Equation, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, expect_each
+from kfcourse.symbolic.structure import Structure, expect_each, form, regressed
+
+Affine: TypeAlias = tuple[Array, Array, Array]  # mean, slope, covariance of the rest
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -54,32 +57,24 @@ def _at(model: JumpModel, structures: Sequence[Structure], k: int) -> Structure:
     before, after = model.law_at(k), model.law_at(k + 1)
     now = [structure.at(k) for structure in structures]
 
-    def moved(z: Array, p: Array) -> tuple[Array, Array, Array]:
+    def state(z: Array, p: Array) -> Affine:
         parts = [(structure.predict(z, p).mean, *structure.transition(z, p)) for structure in now]
         return _mixed(after, parts, p)
 
-    def predict(z: Array, p: Array) -> Gaussian:
-        tau, A, Q = moved(z, p)
-        return Gaussian(tau, _form(A, p) + Q)
-
-    def measure(m: Array, d: Array) -> Measurement:
+    def meter(m: Array, d: Array) -> Affine:
         parts = [structure.measure(m, d) for structure in now]
-        h, G, R = _mixed(before, [(part.h, part.G, part.R) for part in parts], d)
-        return Measurement(h, G, _form(G, d) + R, R)
+        return _mixed(before, [(part.h, part.G, part.R) for part in parts], d)
 
-    def transition(z: Array, p: Array) -> Transition:
-        return Transition(*moved(z, p)[1:])
-
-    return Structure("averaged", model.modes[0], predict, measure, transition)
+    return regressed("averaged", model.modes[0], state, meter)
 
 
-def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
+def averaged_equations(model: JumpModel) -> tuple[Equation, Equation]:
     """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j;
     errors as of `averaged`."""
     check_averaged(model)
     states, meters = zip(*map(compile_noiseless, model.modes), strict=True)
 
-    def mean_of(equations: Sequence[Noiseless], later: int) -> Noiseless:
+    def mean_of(equations: Sequence[Equation], later: int) -> Equation:
         def mean(x: Array, k: int | None = None) -> Array:
             now = k or 0
             return _mean(model.law_at(now + later), [equation(x, now) for equation in equations])
@@ -101,9 +96,7 @@ def check_averaged(model: JumpModel, what: str = "the average over the modes") -
         )
 
 
-def _mixed(
-    weights: Array, parts: Sequence[tuple[Array, Array, Array]], cov: Array
-) -> tuple[Array, Array, Array]:
+def _mixed(weights: Array, parts: Sequence[Affine], cov: Array) -> Affine:
     """Mean, slope, and covariance that the slope does not explain, of affine functions with these
     weights over a law with this covariance."""
     means, slopes, _ = zip(*parts, strict=True)
@@ -111,14 +104,9 @@ def _mixed(
     spreads = []
     for value, own, rest in parts:
         off = (value - mean)[..., None]
-        spreads.append(rest + _form(own - slope, cov) + product(off, transpose(off)))
+        spreads.append(rest + form(own - slope, cov) + product(off, transpose(off)))
     return mean, slope, _mean(weights, spreads)
 
 
 def _mean(weights: Array, values: Sequence[Array]) -> Array:
     return sum((q * value for q, value in zip(weights, values, strict=True)), np.zeros(()))
-
-
-def _form(matrix: Array, cov: Array) -> Array:
-    """M P M^T."""
-    return product(product(matrix, cov), transpose(matrix))

@@ -81,12 +81,10 @@ def _compiled(arguments: tuple[sp.NDimArray, ...], outputs: tuple[sp.NDimArray, 
                 varying.append(index)
                 entries.append(_in_floats(output[index].xreplace(renamed)))
         parts.append((constant, varying))
-    used = set().union(*(entry.free_symbols for entry in entries))
-    taken = {name: place for name, place in zip(names, places, strict=True) if name in used}
-    numeric = sp.lambdify([*taken], entries, ["scipy", "numpy"], cse=_shared)
+    numeric = sp.lambdify(names, entries, ["scipy", "numpy"], cse=_shared)
 
     def function(*arrays: Array) -> tuple[Array, ...]:
-        columns = (arrays[number][(..., *index)] for number, index in taken.values())
+        columns = (arrays[number][(..., *index)] for number, index in places)
         values = iter(numeric(*columns))
         leads = [
             array.shape[: array.ndim - len(symbols.shape)]
@@ -119,10 +117,8 @@ def _assembled(
 def _in_floats(expression: sp.Expr) -> sp.Expr:
     """With floats for fractions of numbers that a 64-bit integer does not hold: NumPy would take
     these for objects."""
-    large = [
-        number for number in expression.atoms(sp.Rational) if max(abs(number.p), number.q) > 2**53
-    ]
-    return expression.xreplace({number: sp.Float(number, 17) for number in large})
+    numbers = expression.atoms(sp.Rational)
+    return expression.xreplace({n: sp.Float(n, 17) for n in numbers if max(abs(n.p), n.q) > 2**53})
 
 
 def _shared(

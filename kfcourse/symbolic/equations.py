@@ -13,8 +13,6 @@ from kfcourse.symbolic.model import Model
 # a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends on
 # the step, at step k: equation(x, v, k).
 Equation: TypeAlias = Callable[..., Array]
-# a(x, m_v) or b(x, m_w), x (..., n) -> (..., n) or (..., p), and with the step
-Noiseless: TypeAlias = Callable[..., Array]
 
 
 def compile_model(model: Model) -> tuple[Equation, Equation]:
@@ -28,7 +26,7 @@ def compile_model(model: Model) -> tuple[Equation, Equation]:
     return _compiled(model.state_equation, model.v, model), meter
 
 
-def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
+def compile_noiseless(model: Model) -> tuple[Equation, Equation]:
     """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (...,
     n), (..., p)."""
     state, meter = compile_model(model)

@@ -24,8 +24,6 @@ from kfcourse.errors import ModelError
 
 NAMES = "sin cos tan atan atan2 exp log sqrt tanh sinh cosh Abs sign Heaviside"
 FUNCTIONS = {name: getattr(sp, name) for name in NAMES.split()} | {"abs": sp.Abs}
-# how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
-ARGUMENTS = {"atan2": 2}
 CONSTANTS = {"pi": sp.pi}
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -64,15 +62,16 @@ def symbol(name: str) -> sp.Symbol:
 
 def check_name(name: str) -> str:
     """Return `name` if it can name a parameter or variable in a formula; ModelError if not."""
-    problem = ""
-    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        problem = "cannot name a symbol: use letters, digits and _, a letter first"
-    elif keyword.iskeyword(name):
-        problem = f"is a reserved word of Python; choose another name, such as {name}_"
-    elif name in FUNCTIONS or name in CONSTANTS:
-        problem = "already means a function or constant in formulas; choose another name"
-    if problem:
-        raise ModelError(f"{name!r} {problem}")
+    if (
+        not isinstance(name, str)
+        or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name)
+        or keyword.iskeyword(name)
+        or name in FUNCTIONS | CONSTANTS
+    ):
+        raise ModelError(
+            f"{name!r} cannot name a symbol: use letters, digits and _, a letter first; no word "
+            f"that already means something in formulas or in Python"
+        )
     return name
 
 
@@ -212,15 +211,17 @@ class Reader:
     def number(self, node: ast.Constant) -> sp.Expr:
         if isinstance(node.value, bool) or not isinstance(node.value, int | float):
             raise self.fail(node, f"{node.value!r} is not a real number")
-        written = ast.get_source_segment(self.formula[self.offset :], node) or ""
-        # as written, since 1e-400 is 0 as a float
-        value = sp.Rational(node.value if isinstance(node.value, int) else written.replace("_", ""))
-        if value and not 1e-100 < abs(value) < 10**100:
+        written = (ast.get_source_segment(self.formula[self.offset :], node) or "").replace("_", "")
+        value = node.value
+        # as written: 1e-400 is 0 as a float, and 0e999999999 would take for ever as a fraction
+        if value == 0 and (isinstance(value, int) or not re.match("[0.]*[1-9]", written)):
+            return sp.S.Zero
+        if not 1e-100 < value < 1e100:
             raise self.fail(
                 node,
                 "the number is too large or too small (1e-100 to 1e100 are read): change the units",
             )
-        return value
+        return sp.Rational(value if isinstance(value, int) else written)
 
     def name(self, node: ast.Name) -> sp.Expr:
         known = self.symbols | CONSTANTS
@@ -275,7 +276,7 @@ class Reader:
                 f"{ast.unparse(node.func)[:40]!r} is not a known function{hint}; known: "
                 f"{', '.join(sorted(FUNCTIONS))}",
             )
-        count = ARGUMENTS.get(node.func.id, 1)
+        count = 1 + (node.func.id == "atan2")  # atan2(y, x) is the angle of the point (x, y)
         if node.keywords or len(node.args) != count:
             raise self.fail(node, f"{node.func.id} takes {count} argument{'s' * (count > 1)}")
         if self.nested >= MAX_NESTED:

@@ -60,7 +60,7 @@ class JumpModel:
 
     names: tuple[str, ...]
     modes: tuple[Model, ...]
-    first: Array = field(compare=False)
+    first: Array = field(repr=False, compare=False)
     chain: sp.ImmutableMatrix = field(repr=False)
     known: Known = field(repr=False, compare=False)
 
@@ -102,8 +102,8 @@ class JumpModel:
         >>> from kfcourse import JumpModel
         >>> JumpModel.define("0.9*x + v", "x + C*w", modes={"sound": {"parameters": {"C": 1}},
         ...                  "faulty": {"parameters": {"C": 10}}}, transition=[0.8, 0.2])
-        JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x;
-        C = 10)
+        JumpModel(names=('sound', 'faulty'), modes=(Model(x' = v + 9*x/10, y = C*w + x; C = 1),
+        Model(x' = v + 9*x/10, y = C*w + x; C = 10)))
         """
         shared = {"state": state, "meter": meter, **options}
         common, changed = table("parameters", parameters), set[str]()
@@ -213,11 +213,6 @@ class JumpModel:
         if not self.known.symbols:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
-
-    def __repr__(self) -> str:
-        texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
-        pairs = zip(self.names, texts, strict=True)
-        return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in pairs)})"
 
 
 def _chain(rows: Array, model: Model, changed: Collection[str]) -> tuple[sp.ImmutableMatrix, Known]:

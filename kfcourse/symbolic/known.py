@@ -14,7 +14,9 @@ import sympy as sp
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import check_name, symbol
 from kfcourse.symbolic.reading import (
+    Formula,
     ModelError,
+    by_name,
     exact_matrix,
     exact_number,
     law,
@@ -51,11 +53,16 @@ class Known:
             raise ModelError(
                 f"the interval between two steps must be positive, got {shown(interval)}"
             )
-        values = {
-            check_name(name): _sequence(name, given)
-            for name, given in table("inputs", inputs).items()
-        }
-        return cls((), length, values)
+        sequences = {}
+        for name, given in table("inputs", inputs).items():
+            values = numbers(given)
+            if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
+                raise ModelError(
+                    f"the input {name} must be a list of finite numbers, one for every step; got "
+                    f"{shown(given)}"
+                )
+            sequences[check_name(name)] = tuple(values.tolist())
+        return cls((), length, sequences)
 
     def names(self, taken: Sequence[str]) -> dict[str, sp.Symbol]:
         """Symbols that formulas may use: k and t, where they name nothing else, and the inputs."""
@@ -115,33 +122,21 @@ class Known:
         return lines
 
 
-def _sequence(name: str, given: Any) -> tuple[float, ...]:
-    values = numbers(given)
-    if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
-        raise ModelError(
-            f"the input {name} must be a list of finite numbers, one for every step; got "
-            f"{shown(given)}"
-        )
-    return tuple(values.tolist())
-
-
-def varying_law(
+def equation_and_law(
     what: str,
-    given: Mapping[str, Any] | None,
+    formulas: Sequence[Formula],
     noises: Sequence[sp.Symbol],
+    given: Mapping[str, Any] | None,
     symbols: dict[str, sp.Symbol],
-) -> tuple[dict[sp.Symbol, sp.Expr], Gaussian]:
-    """A law of noises in which variances may be formulas of the step.
+    x: Sequence[sp.Symbol],
+) -> tuple[sp.ImmutableMatrix, Gaussian]:
+    """The state or the meter equation, and the law of its noises, in which variances may be
+    formulas of the step.
 
     A noise with the mean m and the variance D_k is m + sqrt(D_k) (v - m) with a v of the variance
-    1: this goes into the equations.
-
-    Returns
-    -------
-    dict, Gaussian
-        What takes the place of each such noise in the equations, and the law of the noises.
+    1: this goes into the equation.
     """
-    parts = table(what, given)
+    parts = table(f"{what}_noise", given)
     variance = parts.get("variance", 1.0)
     entries = variance if isinstance(variance, list | tuple) else [variance] * len(noises)
     deviations = {
@@ -151,6 +146,9 @@ def varying_law(
     }
     if deviations:
         parts["variance"] = [1.0 if isinstance(entry, str) else entry for entry in entries]
-    result = law(what, parts, len(noises))
+    result = law(f"{what}_noise", parts, len(noises))
     means = dict(zip(noises, exact_matrix(result.mean), strict=True))
-    return {v: means[v] + scale * (v - means[v]) for v, scale in deviations.items()}, result
+    changed = {v: means[v] + scale * (v - means[v]) for v, scale in deviations.items()}
+    names = symbols | by_name(x, noises)
+    equation = sp.ImmutableMatrix([read(formula, names, what) for formula in formulas])
+    return equation.subs(changed), result

@@ -14,19 +14,19 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
-from kfcourse.angles import Angles
+from kfcourse.angles import Angles, Components
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees
 from kfcourse.symbolic.codegen import Compiled, Entries, check_numbers, compile_function
 from kfcourse.symbolic.formula import check_name, symbol
-from kfcourse.symbolic.known import Known, varying_law
+from kfcourse.symbolic.known import Known, equation_and_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -36,12 +36,25 @@ from kfcourse.symbolic.reading import (
     law,
     numbered,
     parameter_values,
-    read,
     shown,
     table,
 )
 from kfcourse.symbolic.typesetting import aligned, with_index
 from kfcourse.symbolic.writing import formula_latex, number_latex
+
+
+class AngleWarning(UserWarning):
+    """A formula finds or contains an angle, and the model does not say that it is one."""
+
+
+class Half(NamedTuple):
+    """The object or the meter of a model: its equation, its noises with their law, and which
+    components of its value are angles."""
+
+    equation: sp.ImmutableMatrix
+    noises: tuple[sp.Symbol, ...]
+    law: Gaussian
+    angles: Components
 
 
 @dataclass(frozen=True)
@@ -135,8 +148,7 @@ class Model:
         -----
         AngleWarning
             A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given; a
-            meter contains an angle outside sin and cos, and is none; the prior mean of an angle is
-            beyond 2 pi.
+            meter contains an angle outside sin and cos, and is none.
 
         Examples
         --------
@@ -145,11 +157,8 @@ class Model:
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
         values = parameter_values(parameters)
-        a, b, known = (
-            formula_list("state", state),
-            formula_list("meter", meter),
-            Known.read(interval, inputs),
-        )
+        a, b = formula_list("state", state), formula_list("meter", meter)
+        known = Known.read(interval, inputs)
         used = {name for f in (*a, *b) for name in re.findall(r"[A-Za-z]\w*", str(f))}
         named = _symbols(symbols, [*values, *known.inputs], used, len(a))
         x, v, w = (tuple(symbol(name) for name in named[key]) for key in "xvw")
@@ -160,14 +169,8 @@ class Model:
             )
         of_step = known.names([*values, *by_name(x, v, w)])
         constants = {name: symbol(name) for name in values} | of_step
-        change_v, law_v = varying_law("state_noise", state_noise, v, constants)
-        change_w, law_w = varying_law("meter_noise", meter_noise, w, constants)
-        state_equation = sp.ImmutableMatrix(
-            [read(f, constants | by_name(x, v), "state") for f in a]
-        ).subs(change_v)
-        meter_equation = sp.ImmutableMatrix(
-            [read(f, constants | by_name(x, w), "meter") for f in b]
-        ).subs(change_w)
+        state_equation, law_v = equation_and_law("state", a, v, state_noise, constants, x)
+        meter_equation, law_w = equation_and_law("meter", b, w, meter_noise, constants, x)
         model = cls(
             state_equation,
             meter_equation,
@@ -178,16 +181,13 @@ class Model:
             law("prior", prior, len(x)),
             law_v,
             law_w,
-            read_angles(angles, [s.name for s in x], numbered("y", len(b))),
+            _read_angles(angles, [s.name for s in x], numbered("y", len(b))),
             known.used(sp.Matrix([*state_equation, *meter_equation]), of_step),
         )
-        names = [s.name for s in x]
         if angles is None:
-            warn_of_angles(angles, (), dict(zip(names, model.state_equation, strict=True)))
+            _warn_of_angles(angles, (), zip([s.name for s in x], model.state_equation, strict=True))
         turning = [x[i] for i in model.angles.x]
-        equations = dict(zip(model.measured, model.meter_equation, strict=True))
-        warn_of_angles(angles, turning, equations)
-        warn_of_degrees("the prior mean", model.prior.mean, names, model.angles.x)
+        _warn_of_angles(angles, turning, zip(model.measured, model.meter_equation, strict=True))
         model._check()
         if not model.meter_equation.has(*x):
             raise ModelError(
@@ -198,8 +198,8 @@ class Model:
 
     def _check(self) -> None:
         """ModelError if an equation cannot be computed with the parameters' values."""
-        for what, equation in (("state", self.state_equation), ("meter", self.meter_equation)):
-            for formula in equation:
+        for what, half in zip(("state", "meter"), self.halves, strict=True):
+            for formula in half.equation:
                 try:
                     number = formula.subs(self.values)
                 except TypeError:  # SymPy's, where a root of a negative number is compared
@@ -216,6 +216,14 @@ class Model:
     def p(self) -> int:
         """Number of measurement components."""
         return len(self.meter_equation)
+
+    @property
+    def halves(self) -> tuple[Half, Half]:
+        """Object and meter."""
+        return (
+            Half(self.state_equation, self.v, self.state_noise, self.angles.x),
+            Half(self.meter_equation, self.w, self.meter_noise, self.angles.y),
+        )
 
     @cached_property
     def values(self) -> dict[sp.Symbol, sp.Rational]:
@@ -282,10 +290,9 @@ class Model:
                 f"the model has no input {', '.join(unknown)}; it has "
                 f"{', '.join(self.known.inputs) or 'none'}"
             )
-        given = Known.read(self.known.interval, inputs).inputs
-        return dataclasses.replace(
-            self, known=dataclasses.replace(self.known, inputs={**self.known.inputs, **given})
-        )
+        known = Known.read(self.known.interval, {**self.known.inputs, **inputs})
+        known = dataclasses.replace(known, symbols=self.known.symbols)
+        return dataclasses.replace(self, known=known)
 
     def latex(self, values: bool = True, indexed: bool = False) -> str:
         """The two equations, and the parameters' values unless they are not wanted, as a LaTeX
@@ -342,13 +349,10 @@ def nothing_random(model: Model) -> str:
     enough."""
     moving, measured = (
         any(
-            variance and equation.subs(model.values).has(noise)
-            for noise, variance in zip(noises, law.cov.diagonal(), strict=True)
+            variance and half.equation.subs(model.values).has(noise)
+            for noise, variance in zip(half.noises, half.law.cov.diagonal(), strict=True)
         )
-        for equation, noises, law in (
-            (model.state_equation, model.v, model.state_noise),
-            (model.meter_equation, model.w, model.meter_noise),
-        )
+        for half in model.halves
     )
     if not moving and not model.prior.cov.any():
         return (
@@ -391,3 +395,48 @@ def _symbols(
             f"names"
         )
     return result
+
+
+def _read_angles(given: Names | None, x: list[str], y: list[str]) -> Angles:
+    """The components named."""
+    names = () if given is None else given
+    if not isinstance(names, Sequence) or any([*x, *y].count(name) != 1 for name in names):
+        raise ModelError(
+            f"`angles` is a list of names of components, each of one only, such as those of "
+            f"{', '.join([*x, *y])}; got {shown(given)}"
+        )
+    return Angles(*(tuple(i for i, name in enumerate(kind) if name in names) for kind in (x, y)))
+
+
+def _warn_of_angles(
+    given: Names | None, turning: Sequence[sp.Symbol], equations: Iterable[tuple[str, sp.Expr]]
+) -> None:
+    """AngleWarning for components that may pass from pi to -pi and of which nothing is said: those
+    with an atan2, where nothing is said at all, and those that contain an angle as it is."""
+    for name, equation in equations:
+        jumping = [
+            part
+            for part in _outside_sines(equation)
+            if part in turning
+            # an atan2 of a point to the right jumps nowhere
+            or (given is None and isinstance(part, sp.atan2) and not part.args[1].is_nonnegative)
+        ]
+        if jumping and name not in (given or ()):
+            quoted = ", ".join(f'"{angle}"' for angle in [*(given or ()), name])
+            warnings.warn(
+                f"{name} contains the angle {jumping[0]}, which jumps from pi to -pi, outside sin "
+                "and cos, and a filter takes the jump for an innovation of a turn: say "
+                f"angles=[{quoted}], or angles=[] if nothing comes near pi",
+                AngleWarning,
+                stacklevel=3,  # where Model.define was called
+            )
+
+
+def _outside_sines(formula: sp.Basic) -> Iterator[sp.Basic]:
+    """Its parts that stand outside sine, cosine and tangent."""
+    parts = sp.preorder_traversal(formula)
+    for part in parts:
+        if isinstance(part, sp.sin | sp.cos | sp.tan):
+            parts.skip()
+        else:
+            yield part

@@ -83,7 +83,13 @@ class GaussianMoments:
     def mean_of(self, function: sp.Expr) -> sp.Expr:
         """M[function(x)]; NoClosedForm names the term if there is none."""
         return _real(
-            sum((self._mean_of_term(t) for t in decompose(function, self.variables)), sp.S.Zero)
+            sum(
+                (
+                    self._scale(term.rate) * self._polynomial_mean(*term)
+                    for term in decompose(function, self.variables)
+                ),
+                sp.S.Zero,
+            )
         )
 
     def covariance(self, left: sp.Expr, right: sp.Expr) -> sp.Expr:
@@ -94,18 +100,12 @@ class GaussianMoments:
                 total += self._covariance_of_terms(s, t)
         return _real(total)
 
-    def _mean_of_term(self, term: Term) -> sp.Expr:
-        return self._scale(term.rate) * self._polynomial_mean(term.polynomial, term.rate)
-
     def _covariance_of_terms(self, s: Term, t: Term) -> sp.Expr:
         # M[s t] - M[s] M[t] = scale(s) scale(t) (e^{a^T P b} Q_st - Q_s Q_t)
         #                    = scale(s) scale(t) ((e^{a^T P b} - 1) Q_st + (Q_st - Q_s Q_t))
         both = tuple(a + b for a, b in zip(s.rate, t.rate, strict=True))
         q_st = self._polynomial_mean(s.polynomial * t.polynomial, both)
-        q_s, q_t = (
-            self._polynomial_mean(s.polynomial, s.rate),
-            self._polynomial_mean(t.polynomial, t.rate),
-        )
+        q_s, q_t = self._polynomial_mean(*s), self._polynomial_mean(*t)
         exponent = sp.expand((sp.Matrix(s.rate).T * self.cov * sp.Matrix(t.rate))[0])
         difference = sp.expand(q_st - q_s * q_t)
         return (
@@ -196,12 +196,11 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
             else:
                 raise _no_closed_form(factor, function)
         rate = tuple(sp.expand(sp.diff(exponent, x)) for x in variables)
-        if any(r.has(*variables) for r in rate):
-            raise _no_closed_form(sp.exp(exponent), function)
         constant = sp.expand(
             exponent - sum((r * x for r, x in zip(rate, variables, strict=True)), sp.S.Zero)
         )
-        if constant.has(*variables):  # atan2(x, x), whose slope is zero
+        # the constant of atan2(x, x), whose slope is zero
+        if any(part.has(*variables) for part in (*rate, constant)):
             raise _no_closed_form(sp.exp(exponent), function)
         collected[rate] = collected.get(rate, sp.S.Zero) + polynomial * _cis(constant)
     return [

@@ -10,13 +10,12 @@ noises, s variables together.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from itertools import product as cartesian
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.angles import Components, difference, on_circle
 from kfcourse.errors import expect
@@ -24,20 +23,19 @@ from kfcourse.laws import (
     SINGULAR,
     Array,
     Gaussian,
-    Measurement,
-    Transition,
-    measurement_of,
     square_root,
     symmetric,
     transpose,
 )
-from kfcourse.symbolic.choices import decides
-from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.equations import Equation, compile_model
+from kfcourse.symbolic.model import Half, Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
-from kfcourse.symbolic.structure import Structure, of_steps
+from kfcourse.symbolic.sides import decides
+from kfcourse.symbolic.structure import Structure, of_steps, regressed
 
 Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
+# (mean, cov, k) -> mean of an equation, slopes by x, covariance of what is not linear in x
+Regression: TypeAlias = Callable[..., tuple[Array, Array, Array]]
 
 MOST_POINTS = 100_000
 # Means may change by this part of a standard deviation when the order is doubled, covariances by
@@ -119,7 +117,14 @@ def gauss_hermite(model: Model, order: int = 5) -> Structure:
 def axes(model: Model) -> int:
     """Over how many variables the Gauss-Hermite rule spreads: the state, and the noises of an
     equation that need points."""
-    return max(side.axes for side in _sides(model, partial(product_rule, 1)))
+    sizes = []
+
+    def rule(size: int) -> tuple[Array, Array]:
+        sizes.append(size)
+        return product_rule(1, size)
+
+    _sides(model, rule)
+    return max(sizes)
 
 
 def product_rule(order: int, size: int) -> tuple[Array, Array]:
@@ -134,36 +139,18 @@ def product_rule(order: int, size: int) -> tuple[Array, Array]:
     return points, np.prod(list(cartesian(weights / weights.sum(), repeat=size)), axis=1)
 
 
-def _sides(model: Model, rule: Rule, with_factors: bool = False) -> list[_Side]:
+def _sides(model: Model, rule: Rule, with_factors: bool = False) -> list[Regression]:
     """Object and meter, with points for the noises that do not enter linearly, or for those
     `with_factors` of the state, too: `rule` makes them."""
-    state, meter = compile_model(model)
-    parts = (
-        (state, model.state_equation, model.v, model.state_noise, model.angles.x),
-        (meter, model.meter_equation, model.w, model.meter_noise, model.angles.y),
-    )
-    return [_side(model, rule, with_factors, *part) for part in parts]
-
-
-class _Side(NamedTuple):
-    """An equation of the model: over how many variables its points spread, and a law of the state
-    through it, (mean, cov, k) -> mean of the equation, its slopes by x, and the covariance of what
-    is not linear in x: regressions on the points."""
-
-    axes: int
-    regressed: Callable[[Array, Array, int | None], tuple[Array, Array, Array]]
+    halves = zip(model.halves, compile_model(model), strict=True)
+    return [_side(model, rule, with_factors, *pair) for pair in halves]
 
 
 def _side(
-    model: Model,
-    rule: Rule,
-    with_factors: bool,
-    function: Callable[..., Array],
-    equation: sp.MatrixBase,
-    noises: Sequence[sp.Symbol],
-    law: Gaussian,
-    angles: Components,
-) -> _Side:
+    model: Model, rule: Rule, with_factors: bool, half: Half, function: Equation
+) -> Regression:
+    """A law of the state through an equation of the model, by regressions on the points."""
+    equation, noises, law, angles = half
     factors = equation.subs(model.values).jacobian(list(noises))
     varying = (*model.x, *noises) if with_factors else noises
     pointed = np.array(
@@ -198,17 +185,19 @@ def _side(
         unexplained = transpose(rest * weights[:, None]) @ rest + covs
         return on_circle(middle + shift, angles), slopes, symmetric(unexplained)
 
-    return _Side(points.shape[1], regressed)
+    return regressed
 
 
-def _lower_root(cov: Array) -> tuple[Array, Array]:
+def _lower_root(cov: Array, unseen: float = UNSEEN) -> tuple[Array, Array]:
     """The Cholesky factor, and which components (..., n) are known: their columns are those of
     I."""
-    n = cov.shape[-1]
-    known = ~(np.diagonal(cov, axis1=-2, axis2=-1) > 0)
-    enlarged = cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n))
-    either = known[..., :, None] | known[..., None, :]
-    return np.linalg.cholesky(np.where(either, np.eye(n), enlarged)), known
+    n, variance = cov.shape[-1], np.diagonal(cov, axis1=-2, axis2=-1)
+    known = ~((variance > 0) & np.isfinite(cov).all(axis=-1))
+    enlarged = cov * (1 + (unseen if n > 1 else 0) * np.eye(n))
+    try:
+        return np.linalg.cholesky(np.where(known[..., :, None], np.eye(n), enlarged)), known
+    except np.linalg.LinAlgError:  # rounding has broken a covariance by more than that
+        return _lower_root(cov, 100 * unseen)
 
 
 def _checked(
@@ -233,23 +222,17 @@ def _checked(
             )
         except ModelError:
             return structure
-        parts = zip(("next state", "measurement"), coarse, fine, model.angles, strict=True)
-        errors = {
-            f"{moment} of the {what}": np.abs(error).max()
-            for what, less, more, angles in parts
-            for moment, error in zip(("mean", "covariance"), apart(less, more, angles), strict=True)
-        }
-    for moment, error in errors.items():
-        if not error <= CONVERGED:
-            change = f"changes by {100 * error:.2g} %" if np.isfinite(error) else "is not finite"
-            warnings.warn(
-                f"{name}: with {2 * order} points an axis in place of {order} the {moment} of "
-                f"{model} at the prior law {change}: it may be infinite, or the function too rough "
-                "for these points",
-                QuadratureWarning,
-                stacklevel=3,
-            )
-            break
+        laws = zip(coarse, fine, model.angles, strict=True)
+        error = np.max([np.abs(part).max() for three in laws for part in apart(*three)])
+    if not error <= CONVERGED:
+        change = f"change by {100 * error:.2g} %" if np.isfinite(error) else "are not finite"
+        warnings.warn(
+            f"{name}: with {2 * order} points an axis in place of {order} the moments of {model} "
+            f"at the prior law {change}: they may be infinite, or a function too rough for these "
+            "points",
+            QuadratureWarning,
+            stacklevel=3,
+        )
     return structure
 
 
@@ -273,21 +256,9 @@ def _at_prior(structure: Structure) -> tuple[Gaussian, Gaussian]:
 def _by_points(name: str, model: Model, with_factors: bool, rule: Rule) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights
     (q,))."""
-    state, meter = _sides(model, rule, with_factors)
-    measurement = measurement_of(model.angles.y)
+    sides = _sides(model, rule, with_factors)
 
     def at(k: int | None) -> Structure:
-        def predict(z: Array, p: Array) -> Gaussian:
-            tau, A, Q = state.regressed(z, p, k)
-            return Gaussian(tau, symmetric(A @ p @ transpose(A)) + Q)
-
-        def measure(m: Array, d: Array) -> Measurement:
-            h, G, R = meter.regressed(m, d, k)
-            return measurement(h, G, symmetric(G @ d @ transpose(G)) + R, R)
-
-        def transition(z: Array, p: Array) -> Transition:
-            return Transition(*state.regressed(z, p, k)[1:])
-
-        return Structure(name, model, predict, measure, transition)
+        return regressed(name, model, *(partial(side, k=k) for side in sides))
 
     return of_steps(name, model, at)

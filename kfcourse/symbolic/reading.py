@@ -103,13 +103,8 @@ def formula_list(what: str, formulas: Formulas) -> list[Formula]:
     """One formula or several as a list."""
     several = isinstance(formulas, Sequence | sp.MatrixBase) and not isinstance(formulas, str)
     result = list(formulas) if several else [formulas]
-    if not result:
-        raise ModelError(f"`{what}` holds no formula")
-    for formula in result:
-        if not isinstance(formula, str | sp.Expr):
-            raise ModelError(
-                f"`{what}` must be a formula or a list of formulas, got {shown(formula)}"
-            )
+    if not result or not all(isinstance(formula, str | sp.Expr) for formula in result):
+        raise ModelError(f"`{what}` must be a formula or a list of formulas, got {shown(formulas)}")
     return result
 
 

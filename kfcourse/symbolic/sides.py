@@ -3,14 +3,15 @@ of `linearised` and `gaussian` come from, and derivations by hand start."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
 
 from kfcourse.laws import Gaussian
-from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix, normal_symbols
@@ -33,14 +34,11 @@ class Side:
 
     @classmethod
     def of(cls, model: Model, side: str) -> Side:
-        equation, noise, law, (mean, cov) = (
-            (model.state_equation, model.v, model.state_noise, ("z", "p"))
-            if side == "object"
-            else (model.meter_equation, model.w, model.meter_noise, ("m", "d"))
-        )
-        exact = Gaussian(*map(exact_matrix, law))
+        half = model.halves[side == "meter"]
+        mean, cov = ("z", "p") if side == "object" else ("m", "d")
         symbols = normal_symbols(model.n, mean, cov, model.taken)
-        return cls(equation, model.x, noise, exact, *symbols)
+        law = Gaussian(*map(exact_matrix, half.law))
+        return cls(half.equation, model.x, half.noises, law, *symbols)
 
     def _at_mean(self, matrix: sp.MatrixBase) -> sp.ImmutableMatrix:
         pairs = zip((*self.x, *self.noise), (*self.mean, *self.law.mean), strict=True)
@@ -105,3 +103,30 @@ def moments(side: Side) -> tuple[sp.ImmutableMatrix, ...]:
 def plain(matrix: sp.MatrixBase) -> Any:
     """An expression if it is one by one."""
     return matrix[0] if matrix.shape == (1, 1) else sp.ImmutableMatrix(matrix)
+
+
+def decides(formula: sp.Basic, variables: Sequence[sp.Symbol]) -> bool:
+    """Whether a choice between formulas depends on one of the variables: derivatives by it do not
+    tell."""
+    return any(
+        condition.has(*variables)
+        for choice in formula.atoms(sp.Piecewise)
+        for _, condition in choice.args
+    )
+
+
+def jumps(choice: sp.Piecewise, x: Sequence[sp.Symbol]) -> bool:
+    """Whether a choice that depends on these variables may jump where one formula takes over from
+    the next."""
+    for (formula, condition), (following, _) in pairwise(choice.args):
+        border = next((s for s in x if condition.has(s)), None)
+        if border is None:
+            continue
+        try:
+            places = sp.solve(condition.lhs - condition.rhs, border)
+        except (AttributeError, NotImplementedError):  # several thresholds, or SymPy cannot tell
+            return True
+        steps = ((formula - following).subs(border, place) for place in places)
+        if not places or any(sp.simplify(step) != 0 for step in steps):
+            return True
+    return False

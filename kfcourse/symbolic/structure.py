@@ -32,6 +32,9 @@ from kfcourse.laws import (
     Transition,
     Vectors,
     measurement_of,
+    product,
+    symmetric,
+    transpose,
 )
 from kfcourse.symbolic.codegen import Compiled
 from kfcourse.symbolic.model import Model
@@ -206,6 +209,34 @@ class StructuralFormulas:
             return Structure(self.name, self.model, predicted, measured, transition, self)
 
         return of_steps(self.name, self.model, at, self)
+
+
+def regressed(
+    name: str,
+    model: Model,
+    state: Callable[[Vectors, Matrices], tuple[Any, Any, Any]],
+    meter: Callable[[Vectors, Matrices], tuple[Any, Any, Any]],
+) -> Structure:
+    """The structure of regressions: tau, A, Q of the object at N(z, p), h, G, R of the meter at
+    N(m, d)."""
+
+    def predict(z: Vectors, p: Matrices) -> Gaussian:
+        tau, A, Q = state(z, p)
+        return Gaussian(tau, form(A, p) + Q)
+
+    def measure(m: Vectors, d: Matrices) -> Measurement:
+        h, G, R = meter(m, d)
+        return measurement_of(model.angles.y)(h, G, form(G, d) + R, R)
+
+    def transition(z: Vectors, p: Matrices) -> Transition:
+        return Transition(*state(z, p)[1:])
+
+    return Structure(name, model, predict, measure, transition)
+
+
+def form(matrix: Matrices, cov: Matrices) -> Matrices:
+    """M P M^T."""
+    return symmetric(product(product(matrix, cov), transpose(matrix)))
 
 
 def of_steps(

@@ -23,6 +23,10 @@ _NAME_BEFORE_A_FACTOR = re.compile(
     r"(\\mathit\{[A-Za-z]+\}(?:\^\{[^{}]*\})?) (?!\\(?:right|cdot)\b)(?=[A-Za-z\\{])"
 )
 _WORD_BELOW = re.compile(r"_\{([a-z]{4,})(?=[ }])")  # G_{best}: a word, no product of letters
+_BRACED = r"[^{}]"
+for _ in range(8):  # braces in braces
+    _BRACED = rf"(?:[^{{}}]|\{{{_BRACED}*\}})"
+_FRACTION = re.compile(rf"\\frac\{{({_BRACED}*)\}}\{{({_BRACED}*)\}}")
 _WITHOUT_WIDTH = re.compile(r"\\(?:left|right|mathrm|mathit|operatorname|tilde|hat|[,!])|[{}^_& ]")
 
 
@@ -139,11 +143,9 @@ def _ordered(terms: Sequence[sp.Expr]) -> list[sp.Expr]:
 def symbols(latex: str) -> float:
     """How wide a formula is, counted in symbols; of a fraction the wider part, of matrices the
     widest row."""
-    start = latex.find(r"\frac{")
-    if start >= 0:
-        above, after = _braced(latex, start + len(r"\frac"))
-        below, after = _braced(latex, after)
-        return symbols(latex[:start]) + max(symbols(above), symbols(below)) + symbols(latex[after:])
+    if fraction := _FRACTION.search(latex):
+        wider = max(map(symbols, fraction.groups()))
+        return symbols(latex[: fraction.start()]) + wider + symbols(latex[fraction.end() :])
     matrix = re.search(r"\\begin\{(\w*matrix)\}(.*?)\\end\{\1\}", latex, re.DOTALL)
     if matrix:
         widest = max(symbols(row.replace("&", "  ")) for row in matrix[2].split(r"\\"))
@@ -156,13 +158,3 @@ def symbols(latex: str) -> float:
 def _width(flat: str) -> float:
     tokens = [token for token in _TOKEN.findall(flat) if not _WITHOUT_WIDTH.fullmatch(token)]
     return len(tokens) + 1.2 * sum(token in _OPERATORS for token in tokens)
-
-
-def _braced(latex: str, start: int) -> tuple[str, int]:
-    """What stands between the brace at `start` and its partner, and where it ends."""
-    depth = 0
-    for place in range(start, len(latex)):
-        depth += {"{": 1, "}": -1}.get(latex[place], 0)
-        if depth == 0:
-            return latex[start + 1 : place], place + 1
-    raise ValueError(f"a brace is not closed in {latex!r}")

@@ -122,16 +122,6 @@ def test_a_meter_of_an_angle_that_is_not_declared_warns_and_names_the_cure(meter
         assert caught[0].filename == __file__  # where the model was defined
 
 
-def test_degrees_are_noticed():
-    with pytest.warns(
-        AngleWarning, match="prior mean of the angle x is 90, beyond 2 pi: angles are in radians"
-    ):
-        Model.define("x + v", "x + w", angles=["x", "y"], prior={"mean": 90, "variance": 1})
-    model = Model.define("x + v", "x + w", angles=["x", "y"])
-    with pytest.warns(AngleWarning, match="a measurement of the angle y is 90, beyond 2 pi"):
-        run(aof(linearised(model)), np.array([0.5, np.nan, 90.0]))
-
-
 # ---------------------------------------------------------------- a bearing that passes from pi to
 # -pi
 

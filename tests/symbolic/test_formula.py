@@ -187,6 +187,9 @@ BOMBS = [
     "sqrt(" * 90 + "x" + ")" * 90,
     "sin(" * 90 + "x" + ")" * 90,
     "(1e99*x)**16",
+    "1e999999999*x",
+    "1e-999999999*x",
+    "0e999999999 + x",
     "((1e99*x)**8)**8",
     "(499.123456789012345678)**15.999",
     "(2**0.9999999999)**15.99999",
@@ -262,5 +265,5 @@ def test_an_ordinary_word_names_a_symbol(name):
     ],
 )
 def test_other_words_do_not(name):
-    with pytest.raises(ValueError, match=r"cannot name|reserved word|already means"):
+    with pytest.raises(ValueError, match=r"cannot name|already means"):
         check_name(name)

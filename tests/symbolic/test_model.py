@@ -80,7 +80,7 @@ REFUSED = [
     ("x + w", "x + w", {}, "unknown symbol 'w'"),  # the meter's noise in the object
     (sp.Symbol("x") + sp.Symbol("q"), "x + w", {}, "unknown symbols q"),
     ("x + v", "w", {}, "nothing to filter"),
-    ("x + v", [], {}, "no formula"),
+    ("x + v", [], {}, "must be a formula"),
     *((state, "x + w", {}, "must be a formula") for state in ([3], None)),
     # numbers out of all sizes, with their place
     *((state, meter, {"parameters": {"a": a}}, f"the {place} equation, .* with these parameters: ")

@@ -116,3 +116,6 @@ def test_a_covariance_that_rounding_has_broken_is_no_error():
     filters = aof(gauss_hermite(model)), aof(linearised(model))
     (_, points), (_, exact) = (run(each, np.zeros((6, 1, 2))) for each in filters)
     assert_allclose(points[-1], exact[-1], rtol=1e-5)
+    law = np.zeros(2), np.array([[1.0, 1 + 1e-10], [1 + 1e-10, 1.0]])
+    # enlarged by 2e-10 of itself, and to second order by its inverse
+    assert_allclose(gauss_hermite(model).measure(*law).G, [[1, 0], [1, 1]], atol=1e-4)
