@@ -208,12 +208,12 @@ ROOMS = {
     "kfcourse/filters": 30_480,
     "kfcourse/lab": 18_770,
     "kfcourse/linear": 5_550,
-    "kfcourse/montecarlo": 10_510,
+    "kfcourse/montecarlo": 10_480,
     "kfcourse/pages": 8_040,
     "kfcourse/records": 5_540,
     "kfcourse/scenarios": 9_990,
     "kfcourse/symbolic": 20_480,
-    "tests": 171_970,
+    "tests": 171_920,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -323,7 +323,7 @@ def test_the_particles_own_error_is_not_in_the_bound(linear):
     assert (doubt > allowed).all()
 
 
-def test_a_slow_filter_that_fails_is_left_out(variant53):
+def test_a_filter_that_fails_is_left_out(variant53):
     exact = pointmass(variant53)
 
     def fails(state, y):
@@ -331,8 +331,8 @@ def test_a_slow_filter_that_fails_is_left_out(variant53):
             raise ValueError("it cannot")
         return exact.step(state, y)
 
-    slow = replace(exact, slow=True, step=fails)
-    result = compare([aof(gaussian(variant53)), slow], variant53, 100, 3, seed=1)
+    failing = replace(exact, step=fails)
+    result = compare([aof(gaussian(variant53)), failing], variant53, 100, 3, seed=1)
     assert result.names == ("aof-gaussian",)
     assert str(result.left_out["aof-exact"]) == "step 1: aof-exact failed: it cannot"
 
