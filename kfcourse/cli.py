@@ -205,7 +205,8 @@ def lab(
     (BLAS) may round otherwise, by 1e-13 or so.
     """
     chosen = find_variant(variant, variants_file)
-    model = chosen.model
+    folder, model = out or _below(f"lab-{chosen.name}"), chosen.model
+    _check_places(folder, json_file)  # before the long part
     entries, usual = (FILTERS, LAB) if isinstance(model, Model) else (JUMP_FILTERS, JUMP_LAB)
     bound = names is None and (bound or has_exact(model))
     wanted = [*usual, *[EXACT] * bound] if names is None else _names(names)
@@ -230,8 +231,6 @@ def lab(
     if not filters:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
         raise click.ClickException(reasons or "give at least one filter: --filters duof")
-    folder = out or _below(f"lab-{chosen.name}")
-    _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     result = compare(
         filters, model, runs or chosen.runs, steps or chosen.steps, seed, jobs=jobs,

@@ -21,11 +21,11 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.angles import difference
-from kfcourse.errors import NotFinite, Reason, Refused, expect, expect_sizes
+from kfcourse.errors import NotFinite, Reason, expect, expect_sizes
 from kfcourse.filters.base import Filter, State, ahead
 from kfcourse.filters.designed import Design
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
+from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import check_sizes, design, failed
@@ -400,10 +400,7 @@ def _named(filter_: Filter, step: int) -> Iterator[None]:
     try:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
-        numbers = Refused | NotFinite | NegativeVariance | np.linalg.LinAlgError
-        if filter_.slow or isinstance(error, numbers):
-            raise failed(filter_.name, step, error) from None
-        raise
+        raise failed(filter_.name, step, error) from None
 
 
 def _progress(

@@ -299,14 +299,13 @@ def test_a_filter_that_diverges_on_few_trajectories_is_named(variant53):
 def test_the_exact_filter_bounds_the_others_on_the_same_trajectories(variant53):
     filters = [aof(gaussian(variant53)), aof(linearised(variant53)), pointmass(variant53)]
     result = compare(filters, variant53, 300, 3, seed=2)
-    direct = [result.component_variance(name).value[:, 0] for name in result.names]
     above = Estimate.jackknife(
         result._means("square", "aof-gaussian")[:, 0] - result._means("own", "aof-exact")
     )
     gap = result.difference("aof-gaussian", "aof-exact")
     assert (abs(above.value - gap.value) < SIGMA * above.standard_error).all()
     assert (gap.standard_error < above.standard_error / 3).all()  # what the distances are for
-    assert (gap.value > 0).all() and not result.doubtful.any() and np.isfinite(direct).all()
+    assert (gap.value > 0).all() and not result.doubtful.any()
 
 
 def test_the_particles_own_error_is_not_in_the_bound(linear):
@@ -323,7 +322,7 @@ def test_the_particles_own_error_is_not_in_the_bound(linear):
     assert (doubt > allowed).all()
 
 
-def test_a_slow_filter_that_fails_is_left_out(variant53):
+def test_a_filter_that_fails_is_left_out(variant53):
     exact = pointmass(variant53)
 
     def fails(state, y):
@@ -331,8 +330,8 @@ def test_a_slow_filter_that_fails_is_left_out(variant53):
             raise ValueError("it cannot")
         return exact.step(state, y)
 
-    slow = replace(exact, slow=True, step=fails)
-    result = compare([aof(gaussian(variant53)), slow], variant53, 100, 3, seed=1)
+    failing = replace(exact, step=fails)
+    result = compare([aof(gaussian(variant53)), failing], variant53, 100, 3, seed=1)
     assert result.names == ("aof-gaussian",)
     assert str(result.left_out["aof-exact"]) == "step 1: aof-exact failed: it cannot"
 

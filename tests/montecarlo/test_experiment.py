@@ -92,7 +92,6 @@ def test_small_experiments_run(vector, runs, steps):
     result = compare(lab_of(vector), vector, runs, steps, seed=3, design_runs=200)
     for name in result.names:
         assert result.error_variance(name).value.shape == (steps,)
-        assert np.isfinite(result.error_variance(name).value).all()
         assert result.error_mean(name).value.shape == (steps, 2)
 
 
