@@ -41,10 +41,12 @@ MOST_POINTS = 100_000
 # Means may change by this part of a standard deviation when the order is doubled, covariances by
 # this part of themselves.
 CONVERGED = 0.1
+EPS = np.finfo(float).eps
 # Variances are enlarged by this part of themselves (2e-14), so that a root has pivots of 1e-7 at
 # least, and its inverse half of the digits: in directions that a singular covariance knows exactly
 # there would be no points, and no slope.
-UNSEEN = 2 * SINGULAR**2 * np.finfo(float).eps
+UNSEEN = 2 * SINGULAR**2 * EPS
+LOST = 4 * EPS  # what is not above this part of the numbers that it is a difference of is rounding
 
 
 class QuadratureWarning(UserWarning):
@@ -178,7 +180,10 @@ def _side(
         deviation = off - shift[..., None, :]
         cross = transpose(deviation * weights[:, None]) @ standard
         slopes = transpose(np.linalg.solve(transpose(root), transpose(cross)))
-        rest = deviation - dx @ transpose(slopes)  # no difference of nearly equal matrices
+        explained = dx @ transpose(slopes)
+        rest = deviation - explained  # no difference of nearly equal matrices
+        size = np.abs(deviation) + np.abs(explained) + np.abs(middle)[..., None, :]
+        rest = np.where(np.abs(rest) <= LOST * size, 0.0, rest)  # rounding is no noise of the meter
         covs = added(x, k=k)[0]
         if covs.ndim > 2:
             covs = np.einsum("q,...qij->...ij", weights, covs)
@@ -188,16 +193,23 @@ def _side(
     return regressed
 
 
-def _lower_root(cov: Array, unseen: float = UNSEEN) -> tuple[Array, Array]:
-    """The Cholesky factor, and which components (..., n) are known: their columns are those of
-    I."""
-    n, variance = cov.shape[-1], np.diagonal(cov, axis1=-2, axis2=-1)
-    known = ~((variance > 0) & np.isfinite(cov).all(axis=-1))
-    enlarged = cov * (1 + (unseen if n > 1 else 0) * np.eye(n))
-    try:
-        return np.linalg.cholesky(np.where(known[..., :, None], np.eye(n), enlarged)), known
-    except np.linalg.LinAlgError:  # rounding has broken a covariance by more than that
-        return _lower_root(cov, 100 * unseen)
+def _lower_root(cov: Array) -> tuple[Array, Array]:
+    """The Cholesky factor, and which components (..., n) the earlier ones determine: their columns
+    are those of I.
+
+    No LAPACK: a trajectory whose covariance rounding has broken leaves the others as they are.
+    """
+    n = cov.shape[-1]
+    rest = cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n))
+    root, known = np.zeros_like(rest), np.zeros(rest.shape[:-1], dtype=bool)
+    for j in range(n):
+        pivot = rest[..., j, j, None]
+        skipped = ~(pivot > n * EPS * cov[..., j, j, None])
+        column = rest[..., j] / np.sqrt(np.where(skipped, 1.0, pivot))
+        column = np.where(skipped | (np.arange(n) < j), 0.0, column)
+        root[..., j], known[..., j] = np.where(skipped, np.eye(n)[j], column), skipped[..., 0]
+        rest = rest - column[..., :, None] * column[..., None, :]
+    return root, known
 
 
 def _checked(

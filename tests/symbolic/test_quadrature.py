@@ -5,12 +5,14 @@ import warnings
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse import (
     Model,
     QuadratureWarning,
     gauss_hermite,
+    gaussian,
+    likelihood,
     linearised,
     run,
     simulate,
@@ -116,6 +118,24 @@ def test_a_covariance_that_rounding_has_broken_is_no_error():
     filters = aof(gauss_hermite(model)), aof(linearised(model))
     (_, points), (_, exact) = (run(each, np.zeros((6, 1, 2))) for each in filters)
     assert_allclose(points[-1], exact[-1], rtol=1e-5)
-    law = np.zeros(2), np.array([[1.0, 1 + 1e-10], [1 + 1e-10, 1.0]])
-    # enlarged by 2e-10 of itself, and to second order by its inverse
-    assert_allclose(gauss_hermite(model).measure(*law).G, [[1, 0], [1, 1]], atol=1e-4)
+    # one such trajectory leaves the others as they are
+    sound, broken = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[1.0, 1 + 1e-6], [1 + 1e-6, 1.0]])
+    measure, mean = gauss_hermite(model).measure, np.zeros((2, 2))
+    for alone, beside in zip(
+        measure(mean[:1], sound[None]), measure(mean, np.array([sound, broken])), strict=True
+    ):
+        assert_array_equal(beside[0], np.broadcast_to(alone, (1, *beside.shape[1:]))[0])
+
+
+@pytest.mark.parametrize("build", [unscented, gauss_hermite])
+def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
+    """The states are then known, as by the closed form; 1e-32 in the place of 0 made a likelihood
+    of -1e29."""
+    model = Model.define("0.9*x + v", "2*x + 1", prior={"mean": 0.3, "variance": 2.0})
+    y = np.array([1.7, 0.2, -3.0])
+    estimates, exact = (run(aof(filter_(model)), y) for filter_ in (build, gaussian))
+    assert_array_equal(estimates.cov, np.zeros((3, 1, 1, 1)))
+    assert_allclose(estimates.mean, exact.mean, rtol=1e-12)
+    still = Model.define("x", "x", prior={"mean": 0, "variance": 2.0})
+    with pytest.raises(ValueError, match="no density for the measurement of step 1"):
+        likelihood(aof(build(still)), np.array([1.0, 1.1]))
