@@ -199,9 +199,9 @@ def write_record(result: Analysis, folder: Path) -> None:
     figures: dict[str, Callable[[Axes], None]] = {
         f"state-{symbol}": partial(_component, times, columns, symbol.name) for symbol in model.x
     }
-    for name, passed in zip(model.measured, result.examined.passed[:, 0].T, strict=True):
-        figures[f"innovations-{name}"] = partial(_innovations, times, columns, name, passed)
-        figures[f"whiteness-{name}"] = partial(_whiteness, columns, name, passed)
+    for name in model.measured:
+        figures[f"innovations-{name}"] = partial(_innovations, times, columns, name)
+        figures[f"whiteness-{name}"] = partial(_whiteness, columns, name)
     content = {"result": result, "model": lines_of(model.latex()), "figures": [*figures]}
     with replacing_together(folder) as place:
         with (place / "estimate.csv").open("w", encoding="utf-8", newline="") as file:
@@ -241,13 +241,11 @@ def _component(times: Array, columns: Mapping[str, Array], name: str, ax: Axes) 
     _labelled(ax, "time", name)
 
 
-def _innovations(
-    times: Array, columns: Mapping[str, Array], name: str, passed: Array, ax: Axes
-) -> None:
+def _innovations(times: Array, columns: Mapping[str, Array], name: str, ax: Axes) -> None:
     """Innovations of a component of the meter, and what was expected of them."""
     value, two = columns[f"{name}_innovation"], 2 * columns[f"{name}_innovation_sd"]
     measured = ~np.isnan(value)
-    refused = measured & ~passed
+    refused = measured & (columns["weight"] == 0)
     _band(ax, times[measured], np.zeros(measured.sum()), two[measured], ESTIMATE)
     ax.axhline(0, color="black", linewidth=0.8)
     ax.plot(times[~refused], value[~refused], ".", markersize=4, color=MEASURED)
@@ -257,10 +255,11 @@ def _innovations(
     _labelled(ax, "time", f"innovation of {name}")
 
 
-def _whiteness(columns: Mapping[str, Array], name: str, passed: Array, ax: Axes) -> None:
+def _whiteness(columns: Mapping[str, Array], name: str, ax: Axes) -> None:
     """Autocorrelation of the innovations that were taken, from each to the next ones; nothing of
     fewer than three."""
-    s = (columns[f"{name}_innovation"] / columns[f"{name}_innovation_sd"])[passed, None, None]
+    s = columns[f"{name}_innovation"] / columns[f"{name}_innovation_sd"]
+    s = s[~np.isnan(s) & (columns["weight"] > 0), None, None]
     if len(s) >= 3:
         # as for `findings`: a wrong size alone is no correlation
         of_size_1 = Innovations(s, np.mean(s**2) * np.ones((len(s), 1, 1, 1)))

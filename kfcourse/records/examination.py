@@ -49,8 +49,6 @@ class Examination(NamedTuple):
         nu (steps, runs, p), NaN where nothing was measured, and F (steps, runs, p, p).
     weight : ndarray (steps, runs)
         How much each measurement counted: 1 in full, 0 refused, NaN where there was none.
-    passed : ndarray of bool (steps, runs, p)
-        Which components counted: False where a gate refused them, or nothing was measured.
     log_likelihood : ndarray (steps, runs)
     edge : float
         Probability with which a gate lets pass; 1 without a gate.
@@ -60,7 +58,6 @@ class Examination(NamedTuple):
     smoothed: Gaussian
     innovations: Innovations
     weight: Array
-    passed: Array
     log_likelihood: Array
     edge: float
 
@@ -117,7 +114,6 @@ def examine(filter_: Filter, y: Array) -> Examination:
         stacked([state.posterior for state in smoothed]),
         Innovations(innovations, F),
         np.where(np.isnan(y).all(axis=-1), np.nan, weight),
-        ~np.isnan(y) & (weight > 0)[..., None],
         log_densities(filter_, visited, y),
         getattr(visited[-1].memory, "edge", 1.0),
     )
@@ -172,13 +168,10 @@ def findings(examined: Examination, run: int = 0) -> list[Finding]:
     are enough.  Under weights that are neither 0 nor 1 none of this holds; nothing is found of a
     record that was refused altogether.
     """
-    used, z = examined.passed[:, run].any(axis=-1), normal_bound()
+    used, z = examined.weight[:, run] > 0, normal_bound()
     if not used.any():
         return []
-    value, F = (
-        np.where(examined.passed[used, run], examined.innovations.value[used, run], np.nan),
-        examined.innovations.cov[used, run],
-    )
+    value, F = (part[used, run] for part in examined.innovations)
     degrees = (~np.isnan(value)).sum(axis=-1)
     size = size_of(value, F).sum() / degrees.sum()
     mean, variance = _below(degrees, examined.edge)
