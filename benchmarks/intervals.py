@@ -1,7 +1,7 @@
 """How often the intervals of a comparison hold the truth, at all steps, with the defaults of
 `kfcourse lab`.
 
-    .venv/bin/python benchmarks/intervals.py [--variants 53 5 7 2] [--seeds 200] [--runs 20000]
+    .venv/bin/python benchmarks/intervals.py [--variants 53 5 7 2] [--seeds 200] [--runs N]
         [--jobs 2]
 
 For each variant the lab's filters are designed once, and compared on fresh trajectories with each
@@ -98,10 +98,12 @@ def another_design(
     return float(np.median(moved)), float(moved.max())
 
 
-def line(name: str, seeds: int, runs: int, steps: int | None, designs: int, jobs: int) -> str:
+def line(
+    name: str, seeds: int, runs: int | None, steps: int | None, designs: int, jobs: int
+) -> str:
     """A row of the table."""
     variant, start = find_variant(name), time.monotonic()
-    steps = steps or variant.steps
+    steps, runs = steps or variant.steps, runs or variant.runs
     filters = filters_of(name)
     model, work = variant.model, {"jobs": jobs, "progress": False}
     ready = design(filters, Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 0), jobs)
@@ -120,12 +122,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--variants", nargs="+", default=["53", "5", "7", "2"])
     parser.add_argument("--steps", type=int, help="[default: the variant's]")
-    for option, default in (("--seeds", 200), ("--runs", 20_000), ("--designs", 8), ("--jobs", 2)):
+    parser.add_argument("--runs", type=int, help="[default: the variant's]")
+    for option, default in (("--seeds", 200), ("--designs", 8), ("--jobs", 2)):
         parser.add_argument(option, type=int, default=default)
     args = parser.parse_args()
     print(
-        f"{args.seeds} seeds, {args.runs} trajectories, 95 %: mean, worst place, chance of it; "
-        f"another design: median, most"
+        f"{args.seeds} seeds, 95 %: mean, worst place, chance of it; another design: median, most"
     )
     kinds = " | ".join(
         f"{kind:>20}" for kind in ("gap", "difference", "mean gap", "difference of means")
