@@ -101,6 +101,14 @@ def test_style_sheets_load_only_local_files():
         ), sheet
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("stratonovich", "course/stratonovich"), ("particles", "beyond/grid")]
+)
+def test_an_old_address_leads_on(old: str, new: str) -> None:
+    page = (HTML / f"{old}.html").read_text(encoding="utf-8")
+    assert f'location.replace("{new}.html" + location.hash)' in page
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_notebook_is_executed_without_errors(page: str):
     notebook = nbformat.read(EXECUTED / f"{page}.ipynb", as_version=4)
@@ -403,6 +411,12 @@ def test_the_keyboard_reaches_the_text_first(window):
     assert tab.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
     assert tab.evaluate("document.activeElement.checkVisibility()")
     assert tab.locator("main#main-content").count() == 1
+    formulas = tab.locator("div.math")
+    assert (
+        formulas.count()
+        == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count()
+        > 0
+    )
 
 
 def test_a_reference_shows_what_it_leads_to(window):

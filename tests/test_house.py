@@ -209,11 +209,11 @@ ROOMS = {
     "kfcourse/lab": 18_770,
     "kfcourse/linear": 5_550,
     "kfcourse/montecarlo": 10_650,
-    "kfcourse/pages": 7_940,
+    "kfcourse/pages": 7_970,
     "kfcourse/records": 5_460,
     "kfcourse/scenarios": 9_960,
     "kfcourse/symbolic": 18_490,
-    "tests": 169_770,
+    "tests": 170_370,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

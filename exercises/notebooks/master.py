@@ -241,7 +241,8 @@ def context(exercise: Exercise) -> dict[str, Any]:
 
 
 def known_values(model: Model) -> list[str]:
-    """An `aligned` block with the time; none if the equations do not contain it."""
+    """An `aligned` block with the time and the first values of the inputs; none if the equations
+    have neither."""
     lines = model.known.latex() if model.timed else []
     return ["\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"] if lines else []
 

@@ -85,6 +85,8 @@ class Recording(NamedTuple):
             px.
         """
         every = round(interval / GRID)
+        if every < 1 or abs(every * GRID - interval) > 1e-9:
+            raise ValueError(f"interval: expected a multiple of {GRID} s, got {interval}")
         truth = self.position[::every]
         return truth, (truth + measurement_sd * self.noise[::every])[:, None]
 

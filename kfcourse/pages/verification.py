@@ -82,6 +82,8 @@ def verified(
     Unverified
         If a difference does not vanish; the message shows it.
     """
+    if not equations:
+        raise ValueError("verified() needs an equation: verified((left, right))")
     given = _given(equations)
     for sides in given:
         expressions = [sp.sympify(side) for side in sides if not isinstance(side, str)]

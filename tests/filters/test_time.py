@@ -179,7 +179,8 @@ def test_k_and_t_mean_what_else_they_name():
 
 def test_what_is_printed_names_the_step():
     model = Model.define("x + u*v + t", "x + w", inputs={"u": U}, interval=0.5)
-    assert r"t &= \frac{k}{2}" in model.latex()
+    listed = r"t &= \frac{k}{2}", r"u_0, u_1, \ldots &= 0.7, -2, 3, 0, 1.5, -1, \ldots"
+    assert all(line in model.latex() for line in listed)
     assert r"\tau(z, p, k) &= " in linearised(model).latex()
 
 

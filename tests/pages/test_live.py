@@ -78,6 +78,11 @@ def test_a_recording_is_the_track_and_its_noise():
     assert_array_equal(recording.position, recording.position.round(3))
 
 
+def test_an_interval_beside_the_grid_is_refused():
+    with pytest.raises(ValueError, match=r"multiple of 0.01 s"):
+        RECORDING.sampled(0.015, 8.0)
+
+
 # ---------------------------------------------------------------- the browser
 
 

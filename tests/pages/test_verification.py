@@ -73,9 +73,9 @@ def test_what_is_printed_alike_needs_a_name():
 
 
 def test_there_must_be_something_to_verify():
-    for nothing in ((r"\tau", x), "x = 1"):
-        with pytest.raises(ValueError, match="nothing to verify"):
-            verified(nothing)
+    for nothing in ((), ((r"\tau", x),), ("x = 1",)):
+        with pytest.raises(ValueError, match=r"nothing to verify|needs an equation"):
+            verified(*nothing)
     with pytest.raises(ValueError, match="condition"):
         claim("Everything is well.")
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -166,7 +166,7 @@ def motion(
     ValueError
         Inputs that do not fit the dynamics, or begin after they are needed.
     """
-    over = cache(dynamics.over)  # sensors of fixed rates have a few intervals
+    over = lru_cache(dynamics.over)  # sensors of fixed rates have a few intervals
     if inputs is None:
         if dynamics.inputs:
             raise ValueError(

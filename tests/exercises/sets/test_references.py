@@ -1,4 +1,4 @@
-"""Keys of sets f, g, h against independent references: the package's filters,
+"""Keys of sets f, g, h, l, o against independent references: the package's filters,
 derivatives, an integrator."""
 
 from dataclasses import replace
@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from kfcourse import (
     Gaussian,
     Model,
+    gaussian,
     linearised,
     load_variants,
     predictions,
@@ -26,9 +27,12 @@ from kfcourse.exercises.sets.g_extended.companion import linearisation
 from kfcourse.exercises.sets.g_extended.hidden import hidden_functions
 from kfcourse.exercises.sets.h_continuous import keys as continuous_time
 from kfcourse.exercises.sets.h_continuous import questions as continuous_questions
-from kfcourse.filters import aof, kalman_filter
+from kfcourse.exercises.sets.o_modes import keys as modes
+from kfcourse.exercises.sets.o_modes import questions as modes_questions
+from kfcourse.filters import aof, kalman_filter, logic_dynamic
 from kfcourse.lab import find_variant
 from kfcourse.linear.consistency import innovations, nees, nis
+from kfcourse.scenarios.navigation import Dynamics, Observation, Sensor, fuse
 
 
 def test_the_grid_is_the_kalman_filter_on_a_linear_model():
@@ -99,3 +103,50 @@ def test_continuous_numbers():
         assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
         late = solve_ivp(riccati, (0, 60), [3.0], args=tuple(arguments), rtol=1e-10, atol=1e-12)
         assert late.y[0, -1] == pytest.approx(float(D), rel=1e-6)
+
+
+@pytest.mark.parametrize("variant", ["53", "21"])
+def test_two_steps_of_modes_are_the_package_s_filter(variant):
+    for y, m, d, a, q, C, pi, first in modes_questions.two_measurements(exercise("o", variant)):
+        models = [
+            Model.define(
+                "a*x + s*v",
+                "x + C*w",
+                {"a": a, "s": np.sqrt(q), "C": c},
+                prior={"mean": m, "variance": d},
+            )
+            for c in C
+        ]
+        filter_ = logic_dynamic([gaussian(model) for model in models], pi, first)
+        before = filter_.step(filter_.init(1), y[:1, None])
+        after = filter_.step(before, y[1:, None])
+        theirs = modes.two_steps(y, m, d, a, q, C, pi, first)
+        assert_allclose(
+            theirs, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12
+        )
+
+
+# -- keys that are formulas: the package has them otherwise
+
+
+def asked(letter, name):
+    """Key and hidden arguments of a question."""
+    task = exercise(letter, "21")
+    question = task.questions[name]
+    return question.key, question.arguments(task)
+
+
+def test_late_measurements_are_fused_as_by_the_package():
+    key, calls = asked("l", "l5")
+    for tags, arrivals, values, m, P, q, r, now in calls:
+        sensor = Sensor.define("receiver", ["s", "V"], "s + w", variance=r, period=1.0)
+        rows = zip(tags, arrivals, values, strict=True)
+        seen = [
+            Observation("receiver", float(tag), float(at), np.array([[value]]))
+            for tag, at, value in rows
+        ]
+        vehicle = Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
+        law = fuse(vehicle, [sensor], Gaussian(m, P), seen, np.array([now]))
+        mean, cov = key(tags, arrivals, values, m, P, q, r, now)
+        assert_allclose(mean, law.mean[0, 0], rtol=1e-9)
+        assert_allclose(cov, law.cov[0, 0], rtol=1e-9)
