@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from itertools import product as cartesian
 from typing import TypeAlias
@@ -219,8 +220,9 @@ def _checked(
     order: int,
     with_factors: bool = False,
 ) -> Structure:
-    """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and
-    of twice the order, if these do not take too many points."""
+    """The structure, after a look whether it is finite at the prior law, and a comparison there of
+    Gauss-Hermite rules of this order and of twice the order, if these do not take too many
+    points."""
     name = build.func.__name__.replace("_", "-")
     expect(model, Model, name)
     if model.between is not None:
@@ -228,12 +230,13 @@ def _checked(
     by_rule = partial(_by_points, name, model, with_factors)
     structure = by_rule(rule)
     with np.errstate(all="ignore"):
-        try:
-            coarse, fine = (
-                _at_prior(by_rule(partial(product_rule, points))) for points in (order, 2 * order)
-            )
-        except ModelError:
-            return structure
+        coarse = fine = _at_prior(structure)
+        if all(np.isfinite(part).all() for law in fine for part in law):
+            with suppress(ModelError):
+                coarse, fine = (
+                    _at_prior(by_rule(partial(product_rule, points)))
+                    for points in (order, 2 * order)
+                )
         laws = zip(coarse, fine, model.angles, strict=True)
         error = np.max([np.abs(part).max() for three in laws for part in apart(*three)])
     if not error <= CONVERGED:

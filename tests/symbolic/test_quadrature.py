@@ -110,6 +110,11 @@ def test_where_the_points_do_nothing_is_said(kind, term):
         kind(Model.define(f"{term} + v", "x + w", prior={"variance": 0.5}))
 
 
+def test_what_is_not_finite_is_said_where_the_rules_have_too_many_points():
+    with pytest.warns(QuadratureWarning, match="not finite"):
+        unscented(Model.define([f"x{i} + v{i}" for i in range(1, 8)], "log(x1) + w"))
+
+
 def test_a_covariance_that_rounding_has_broken_is_no_error():
     """After a measurement 1e13 times as sharp as the prior the covariance of the state is none, by
     some units of precision."""
