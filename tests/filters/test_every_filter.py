@@ -61,8 +61,6 @@ from kfcourse.lab import find_variant
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.scenarios.radar import kinematic
 
-pytestmark = pytest.mark.quick
-
 STEPS = 6
 CHAIN = [[0.9, 0.1], [0.3, 0.7]]
 STRUCTURES = {

@@ -13,8 +13,6 @@ from kfcourse.filters import kalman_filter
 from kfcourse.lab import find_variant
 from kfcourse.montecarlo.cramer_rao import _mean, posterior_bound
 
-pytestmark = pytest.mark.quick
-
 
 def test_on_a_linear_model_it_is_the_kalman_filter_s_covariance():
     """Matrices that change with the step, correlated noises with means; no trajectory enters."""
