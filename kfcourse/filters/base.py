@@ -70,7 +70,8 @@ class Filter:
         (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its
         `posterior`.
     slow : bool
-        Thousands of times the cost of the others: comparisons run it on a part of the trajectories.
+        Thousands of times the cost of the others, and the memory: comparisons give it fewer
+        trajectories at a time.
     structure : Structure, optional
         For a filter whose laws are normal ones: the structural functions by which it expects
         measurements from its prediction, and predicts from its posterior.  Looking back, likelihood
