@@ -206,7 +206,7 @@ ROOMS = {
     "kfcourse/filters": 30_340,
     "kfcourse/lab": 18_770,
     "kfcourse/linear": 5_550,
-    "kfcourse/montecarlo": 10_640,
+    "kfcourse/montecarlo": 10_600,
     "kfcourse/pages": 7_970,
     "kfcourse/records": 5_460,
     "kfcourse/scenarios": 9_960,
