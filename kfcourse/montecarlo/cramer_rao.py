@@ -20,7 +20,7 @@ Van Trees (1968); Tichavsky, Muravchik, Nehorai (1998).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import sympy as sp
@@ -98,7 +98,7 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
 
 
 def _information(
-    model: Model, equation: sp.MatrixBase, noise: Sequence[sp.Symbol], law: Gaussian, what: str
+    model: Model, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, what: str
 ) -> Callable[[Array, int], tuple[Array, Array, Array]]:
     """(x (runs, n), k) -> I (runs, n, n), m_x^T S^-1 (runs, n, r), S^-1 (runs, r, r) of what the
     equation makes of x."""
