@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import nbformat
 
 from kfcourse.exercises.checks import exercise
-from kfcourse.exercises.grading.running import Ran
+from kfcourse.exercises.grading.running import Kernel, Ran
 from kfcourse.exercises.grading.session import _of_a_stub
 from kfcourse.exercises.grading.values import decode, encode
 from kfcourse.exercises.notebooks.execution import results
@@ -135,6 +135,8 @@ class InsideKernel:
 
     def __init__(self, place, opening, seconds):
         self.seconds, self._namespace, self._answers = seconds, {}, {}
+
+    answer = Kernel.answer
 
     def __enter__(self):
         return self

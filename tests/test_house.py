@@ -198,7 +198,7 @@ ROOMS = {
     "exercises/*.py": 830,
     "exercises/checks": 17_280,
     "exercises/derivations": 14_500,
-    "exercises/grading": 16_090,
+    "exercises/grading": 15_080,
     "exercises/notebooks": 7_750,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_160,

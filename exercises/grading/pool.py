@@ -18,7 +18,6 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
-from queue import SimpleQueue
 
 from tqdm import tqdm
 
@@ -109,21 +108,15 @@ def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Sandbox]:
 
 def graded(works: Sequence[Returned], setting: Setting, workers: int) -> Iterator[Grade]:
     """The grades as they come, so many notebooks at once, with a progress bar."""
-    graders = [Grader(setting) for _ in range(workers)]
-    free: SimpleQueue[Grader] = SimpleQueue()
-    for grader in graders:
-        free.put(grader)
+    own, graders = threading.local(), list[Grader]()
 
-    def grade(work: Returned) -> Grade:
-        grader = free.get()
-        try:
-            return grader(work)
-        finally:
-            free.put(grader)
+    def begin() -> None:
+        own.grader = Grader(setting)
+        graders.append(own.grader)
 
-    threads = ThreadPoolExecutor(workers)
+    threads = ThreadPoolExecutor(workers, initializer=begin)
     try:
-        tasks = [threads.submit(grade, work) for work in works]
+        tasks = [threads.submit(lambda work: own.grader(work), work) for work in works]
         for task in tqdm(
             as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None
         ):

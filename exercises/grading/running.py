@@ -131,13 +131,19 @@ class Kernel:
                 else f"still running after {self.seconds:g} s"
             ) from None
         self._done.append(message)
-        answers = reply.get("answers")
-        types = (
-            {str(name): str(kind or "") for name, kind in answers.items()}
-            if isinstance(answers, dict)
-            else {}
-        )
-        return Ran(clean(str(reply.get("error") or "")), bool(reply.get("stub")), types)
+        types = {name: str(kind or "") for name, kind in reply["answers"].items()}
+        return Ran(clean(str(reply["error"] or "")), bool(reply["stub"]), types)
+
+    def answer(self, question: str) -> Callable:
+        """The function handed in for a question, called in its process."""
+
+        def called(*arguments: Any) -> Any:
+            try:
+                return self.ask(question, arguments, min(ANSWER, self.seconds))
+            except Stopped as reason:
+                raise Unusable(str(reason)) from None
+
+        return called
 
     def ask(self, question: str, arguments: tuple, seconds: float) -> Any:
         """The value of the function handed in for a question.
@@ -213,34 +219,10 @@ class Kernel:
 def _called(reply: Mapping[str, Any], functions: Sequence[Callable]) -> dict[str, Any]:
     """What a function of ours makes of the notebook's values."""
     try:
-        values, named = decode(reply.get("values")), reply.get("named") or {}
-        number = reply["call"]
-        if (
-            type(number) is not int
-            or not 0 <= number < len(functions)
-            or not isinstance(values, tuple)
-        ):
-            raise ProtocolError("a call of nothing")
-        given = {str(name): decode(value) for name, value in named.items()}
-        return {"value": encode(functions[number](*values, **given))}
-    except Exception as error:  # of values of the student's
+        named = {name: decode(value) for name, value in reply["named"].items()}
+        return {"value": encode(functions[reply["call"]](*decode(reply["values"]), **named))}
+    except Exception as error:  # of values of the student's, or of a call of nothing
         return {"raises": type(error).__name__, "says": clean(str(error), 300)}
-
-
-class Answer:
-    """A function of a notebook's, called in its process."""
-
-    def __init__(self, kernel: Kernel, question: str):
-        self._kernel, self._question = kernel, question
-        self._seconds = min(ANSWER, kernel.seconds)
-        self.killed = False  # while it was called
-
-    def __call__(self, *arguments: Any) -> Any:
-        try:
-            return self._kernel.ask(self._question, arguments, self._seconds)
-        except Stopped as reason:
-            self.killed |= isinstance(reason, Killed)
-            raise Unusable(str(reason)) from None
 
 
 KEPT = re.compile(
