@@ -46,14 +46,12 @@ def hand_out(
         variant.plain("the exercises")  # told once, not for each set
     if variants_file and (everything or not names):
         _say_left_out(variants_file, bool(variants))
-    options: dict[str, Any] = {"with_pdf": with_pdf, "masters": masters and masters.absolute()}
-    options["variants_file"] = variants_file and variants_file.absolute()
+    options = {"with_pdf": with_pdf, "masters": masters, "variants_file": variants_file}
     if students:
         work = _for_students(kind, students, [*variants], wanted, out, options)
     else:
-        folder = out.absolute()
         work = [
-            Job(letter, name, folder / safe(name), kind, **options)
+            Job(letter, name, out / safe(name), kind, **options)
             for name in variants
             for letter in wanted
         ]
@@ -122,7 +120,7 @@ def _for_students(
         Job(
             letter,
             student.variant,
-            out.absolute() / student.folder,
+            out / student.folder,
             kind,
             student=f"{student.name}, {student.group}",
             **options,
@@ -161,10 +159,5 @@ def _show(outcomes: Iterable[Outcome], work: Sequence[Job]) -> list[Outcome]:
                 count[folder][status] for status in ("written", "up to date", "failed")
             )
             with tqdm.external_write_mode():  # the progress bar stands aside
-                click.echo(f"{_relative(folder):<28} {written:>7} {old:>11} {wrong:>7}")
+                click.echo(f"{folder!s:<28} {written:>7} {old:>11} {wrong:>7}")
     return failed
-
-
-def _relative(folder: Path) -> str:
-    """A folder as a user would name it: relative to where the command runs, if it is there."""
-    return str(folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder)

@@ -46,8 +46,7 @@ class Job:
     ----------
     letter, variant : str
     folder : Path
-        Where the files go; absolute, as the others: a worker process may have another working
-        directory.
+        Where the files go.
     kind : {"exercises", "nbgrader", "solutions"}
     variants_file : Path or None
     masters : Path or None
