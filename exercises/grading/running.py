@@ -233,21 +233,14 @@ KEPT = re.compile(
 
 def environment(folder: Path, stage: Path) -> dict[str, str]:
     """Environment variables of a notebook's process: few of ours, and a home of its own."""
-    fonts = folder / ".matplotlib"
-    fonts.mkdir()
-    for path in (stage / FONTS).iterdir():
-        shutil.copy(path, fonts)
-    return {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)} | {
+    fonts = shutil.copytree(stage / FONTS, folder / ".matplotlib")
+    kept = {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)}
+    homes = dict.fromkeys(("HOME", "USERPROFILE", "TMPDIR", "TEMP"), str(folder))
+    switches = ("PYTHONDONTWRITEBYTECODE", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    return (kept | homes | dict.fromkeys(switches, "1")) | {
         "PYTHONPATH": str(stage),  # nothing of yours
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "HOME": str(folder),
-        "USERPROFILE": str(folder),
         "IPYTHONDIR": str(folder / ".ipython"),
         "MPLCONFIGDIR": str(fonts),
         "MPLBACKEND": "agg",
-        "TMPDIR": str(folder),
-        "TEMP": str(folder),
         "PYTHONUSERBASE": site.getuserbase(),
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
     }

@@ -114,34 +114,31 @@ def decode(data: Any, proxies: Proxies | None = None) -> Any:
         Number of a function of the other side to what is called here in its place.
     """
     try:
-        return _decoded(data, proxies)
+        match data:
+            case None | bool() | int() | float() | str():
+                return data
+            case ["list" | "tuple" as kind, list(parts)]:
+                values = [decode(part, proxies) for part in parts]
+                return values if kind == "list" else tuple(values)
+            case ["array" | "scalar" as kind, str(text)]:
+                content = io.BytesIO(base64.b64decode(text, validate=True))
+                array = np.load(content, allow_pickle=False)
+                if array.dtype.kind not in "biufc":
+                    raise ProtocolError(f"an array of {array.dtype}")
+                array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
+                return array[()] if kind == "scalar" else array
+            case ["formula", str(text)]:
+                return formula(text)
+            case ["formulas", int(rows), int(columns), list(texts)]:
+                return sp.ImmutableMatrix(rows, columns, list(map(formula, texts)))
+            case ["function", int(number)] if proxies is not None:
+                return proxies(number)
+            case ["other", str(name)]:
+                return type(re.sub(r"[^\w .()]", "", name)[:60] or "object", (Other,), {})()
     except ProtocolError:
         raise
     except Exception as error:  # whatever nonsense leads to
         raise ProtocolError(f"{type(error).__name__}: {error}"[:200]) from None
-
-
-def _decoded(data: Any, proxies: Proxies | None) -> Any:
-    if data is None or isinstance(data, bool | int | float | str):
-        return data
-    match data:
-        case ["list" | "tuple" as kind, list(parts)]:
-            values = [_decoded(part, proxies) for part in parts]
-            return values if kind == "list" else tuple(values)
-        case ["array" | "scalar" as kind, str(text)]:
-            array = np.load(io.BytesIO(base64.b64decode(text, validate=True)), allow_pickle=False)
-            if array.dtype.kind not in "biufc":
-                raise ProtocolError(f"an array of {array.dtype}")
-            array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
-            return array[()] if kind == "scalar" else array
-        case ["formula", str(text)]:
-            return formula(text)
-        case ["formulas", int(rows), int(columns), list(texts)]:
-            return sp.ImmutableMatrix(rows, columns, [formula(text) for text in texts])
-        case ["function", int(number)] if proxies is not None:
-            return proxies(number)
-        case ["other", str(name)]:
-            return type(re.sub(r"[^\w .()]", "", name)[:60] or "object", (Other,), {})()
     raise ProtocolError(f"a value of the kind {str(data)[:40]!r}")
 
 

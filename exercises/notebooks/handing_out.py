@@ -4,9 +4,8 @@ done."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 from tqdm import tqdm
@@ -46,15 +45,26 @@ def hand_out(
         variant.plain("the exercises")  # told once, not for each set
     if variants_file and (everything or not names):
         _say_left_out(variants_file, bool(variants))
-    options = {"with_pdf": with_pdf, "masters": masters, "variants_file": variants_file}
+    places = [(name, out / safe(name), "") for name in variants]
     if students:
-        work = _for_students(kind, students, [*variants], wanted, out, options)
-    else:
-        work = [
-            Job(letter, name, out / safe(name), kind, **options)
-            for name in variants
-            for letter in wanted
+        given = assign(students, [*variants])
+        places = [
+            (student.variant, out / student.folder, f"{student.name}, {student.group}")
+            for student in given
         ]
+        click.echo("group       variant   name")
+        for student in given:
+            click.echo(f"{student.group:<11} {clean(student.variant):<9} {student.name}")
+        if kind == "exercises":
+            table = out / ASSIGNMENT
+            out.mkdir(parents=True, exist_ok=True)
+            save_assignment((student._replace(sets=" ".join(wanted)) for student in given), table)
+            click.echo(f"\nWho has which variant: {table}, for `kfcourse grade --students`")
+    work = [
+        Job(letter, variant, folder, kind, variants_file, masters, with_pdf, whom)
+        for variant, folder, whom in places
+        for letter in wanted
+    ]
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     failed = _show(run_all(work, make, workers, kind), work)
@@ -94,40 +104,6 @@ def _letters(given: str | None) -> list[str]:
             f"no exercise set {', '.join(unknown) or given}; there are {', '.join(sets())}"
         )
     return letters
-
-
-def _for_students(
-    kind: str,
-    students: Path,
-    variants: Sequence[str],
-    letters: Sequence[str],
-    out: Path,
-    options: Mapping[str, Any],
-) -> list[Job]:
-    """A folder for each student, out/group/name, with their variant's notebooks; the assignment is
-    printed."""
-    given = assign(students, variants)
-    click.echo("group       variant   name")
-    for student in given:
-        click.echo(f"{student.group:<11} {clean(student.variant):<9} {student.name}")
-    if kind == "exercises":
-        out.mkdir(parents=True, exist_ok=True)
-        save_assignment(
-            [student._replace(sets=" ".join(letters)) for student in given], out / ASSIGNMENT
-        )
-        click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
-    return [
-        Job(
-            letter,
-            student.variant,
-            out / student.folder,
-            kind,
-            student=f"{student.name}, {student.group}",
-            **options,
-        )
-        for student in given
-        for letter in letters
-    ]
 
 
 def _separate(work: Sequence[Job]) -> None:
