@@ -41,7 +41,7 @@ import numpy as np
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Filter, State, initial_state, without_prediction
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import (
     Array,
@@ -255,22 +255,12 @@ class Sampler:
             kept = _systematic(rng, weights)
             x = np.take_along_axis(x, kept[..., None], axis=2)
             mode = np.take_along_axis(mode, kept, axis=2)
-            predicted = self.ahead(rng, x, mode, k)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         memory = Clouds(
             np.moveaxis(law.mean, 1, 0), effective, log_mean.T, x, mode,
             np.stack(counts, axis=-1), memory.part,
         )  # fmt: skip
-        return State(k + 1, _of_both(*law, self.angles), predicted, memory)
-
-    def ahead(self, rng: np.random.Generator, x: Array, mode: Array, k: int) -> Gaussian:
-        """The law of the next state, from particles that move."""
-        moves = [
-            each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in self.modes
-        ]
-        moved = np.choose(_chosen(rng, self.chances(x, mode, k))[..., None], moves)
-        equal = np.full(mode.shape, 1 / self.size)
-        return _of_both(*weighted(moved, equal, self.angles), self.angles)
+        return without_prediction(k + 1, _of_both(*law, self.angles), memory)
 
 
 class Mode(NamedTuple):

@@ -133,7 +133,7 @@ def test_an_infinite_mean_is_seen_in_several_dimensions_too():
             ["x1 + w1", "x2"],
             "meter equation leaves a component without noise",
         ),
-        ("x + exp(v)", "x + w", "noise enters the state equation nonlinearly"),
+        ("x + exp(v)", "x + w", "the noise enters nonlinearly"),
     ],
 )
 def test_without_a_normal_density_there_is_none(state, meter, message):
