@@ -88,7 +88,7 @@ def code(notebook):
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-def execute_inside(notebook, name=""):
+def execute_inside(notebook):
     """A copy with outputs: values of last lines and errors, after which the rest runs too."""
     result, namespace = nbformat.from_dict(notebook), {}
     for count, cell in enumerate(code(result), 1):
@@ -158,9 +158,7 @@ class InsideKernel:
 
     def ask(self, question, arguments, seconds):
         functions = []
-        sent = _sent(
-            encode(arguments, lambda function: functions.append(function) or len(functions) - 1)
-        )
+        sent = _sent(encode(arguments, functions))
         return decode(_sent(encode(self._answers[question](*decode(sent, functions.__getitem__)))))
 
 

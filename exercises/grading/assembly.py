@@ -72,7 +72,11 @@ def lost(master: NotebookNode, cells: Sequence[Cell]) -> dict[str, str]:
     for stub in (cell for cell in master.cells if "kfcourse" in cell.metadata):
         name = stub.metadata["kfcourse"]["answer"]
         if not {stub.id, name} & back:
-            text = any(cell.id == stub.id or f"def {name}(" in cell.source for cell in cells)
+            text = any(
+                cell.id == stub.id or f"def {name}(" in cell.source
+                for cell in cells
+                if not cell.code
+            )
             fates[name] = (
                 "has become text: make it a code cell again"
                 if text

@@ -42,7 +42,7 @@ def words(text: str) -> list[str]:
     return re.sub(r"[\W_]+", " ", unicodedata.normalize("NFC", text)).casefold().split()
 
 
-def owner(path: str, whom: str, students: Iterable[Student]) -> Student | None:
+def owner(path: str, whom: object, students: Iterable[Student]) -> Student | None:
     """Whose notebook it is: by the names in its path, else by `whom` it was handed out to; None if
     that is not clear.
 

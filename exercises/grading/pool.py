@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib import resources
 from pathlib import Path
 
 from tqdm import tqdm
@@ -27,7 +26,7 @@ from kfcourse.exercises.grading.marking import Setting
 from kfcourse.exercises.grading.results import FAILED, Grade
 from kfcourse.exercises.grading.running import MEMORY, START, WHOLE
 from kfcourse.exercises.grading.sandbox import Sandbox
-from kfcourse.exercises.grading.staging import answers, stage
+from kfcourse.exercises.grading.staging import packages, stage
 from kfcourse.exercises.grading.submissions import Returned
 from kfcourse.limits import limit_process
 
@@ -97,12 +96,7 @@ def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Sandbox]:
     the rest."""
     with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
         staged = stage(Path(made).resolve())
-        hidden = [
-            Path(str(resources.files("kfcourse"))),
-            *answers(),
-            folder,
-            *([masters] if masters else []),
-        ]
+        hidden = [*packages(), folder, *([masters] if masters else [])]
         yield Sandbox(kind, staged, tuple(str(path.resolve()) for path in hidden))
 
 

@@ -156,17 +156,8 @@ class Kernel:
         Stopped
         """
         functions: list[Callable] = []
-
-        def number(function: Callable) -> int:
-            functions.append(function)
-            return len(functions) - 1
-
-        message = {
-            "do": "ask",
-            "question": question,
-            "arguments": encode(arguments, number),
-            "seconds": seconds,
-        }
+        data = encode(arguments, functions)
+        message = {"do": "ask", "question": question, "arguments": data, "seconds": seconds}
         try:
             reply = self._request(message, seconds + GRACE, functions)
             if "value" in reply:

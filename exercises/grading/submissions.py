@@ -90,14 +90,13 @@ def returned(
     works = []
     for path, problem in sorted(_handed_in(folder)):
         name = os.fsencode(path.relative_to(folder).as_posix()).decode("utf-8", "backslashreplace")
-        digest, variant = setting.copy(), ""
+        digest, key, variant = setting.copy(), "", ""
         if not problem:
             with suppress(Unreadable):  # told when it is graded
-                whom = str(claim_of(read_document(path)).get("student"))
-                whose = owner(name, whom, students)
+                whose = owner(name, claim_of(read_document(path)).get("student"), students)
                 variant = whose.variant if whose else ""
                 digest.update(variant.encode() + b"\n" + _content(path))
-        key = digest.hexdigest()
+                key = digest.hexdigest()
         works.append(Returned(path, name, key, seconds, variants_file, masters, variant, problem))
     return works
 
@@ -165,9 +164,10 @@ class Cell(NamedTuple):
 
 def read_document(path: Path) -> dict[str, Any]:
     """The notebook as a dict."""
+    content = _content(path)
     try:
-        document = json.loads(_content(path))
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
+        document = json.loads(content)
+    except (ValueError, RecursionError):
         raise Unreadable(
             "not a notebook: the file is not JSON; was it cut off, or saved as something else?"
         ) from None

@@ -51,18 +51,18 @@ class Other:
     """What arrives of a value that is none of those above: the name of its type."""
 
 
-Functions = Callable[[Any], int]  # registers a function that the other side may call: its number
 Proxies = Callable[[int], Any]  # the function of a number, as this side calls it
 
 
-def encode(value: Any, functions: Functions | None = None) -> Any:
+def encode(value: Any, functions: list[Callable] | None = None) -> Any:
     """The value as what `json.dumps` takes.
 
     Parameters
     ----------
     value
-    functions : callable, optional
-        Gives a function its number; without it a function is a value of another type.
+    functions : list, optional
+        Takes functions that the other side may call by their numbers in it; without it a function
+        is a value of another type.
     """
     if value is None or type(value) in (bool, int, float, str):
         return value
@@ -78,7 +78,8 @@ def encode(value: Any, functions: Functions | None = None) -> Any:
     if isinstance(value, sp.Expr):
         return ["formula", _text(value)]
     if callable(value) and functions is not None:
-        return ["function", functions(value)]
+        functions.append(value)
+        return ["function", len(functions) - 1]
     # of NumPy, pandas and the like
     if isinstance(value, complex) or (hasattr(value, "__array__") and not isinstance(value, type)):
         return _array(value, functions)
@@ -91,7 +92,7 @@ def _text(formula: sp.Expr) -> str:
     return sp.srepr(formula, order="none")  # to put long sums in order takes minutes
 
 
-def _array(value: Any, functions: Functions | None) -> Any:
+def _array(value: Any, functions: list[Callable] | None) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "O":
         return encode(array.tolist(), functions)

@@ -47,18 +47,16 @@ class _Client(NotebookClient):
 
 
 class NotebookFailed(RuntimeError):
-    """A notebook stopped; the message names it and the cell."""
+    """A notebook stopped; the message names the cell."""
 
 
-def execute(notebook: NotebookNode, name: str) -> NotebookNode:
+def execute(notebook: NotebookNode) -> NotebookNode:
     """Run a notebook in a new kernel and an empty folder.
 
     Parameters
     ----------
     notebook : NotebookNode
         Not changed.
-    name : str
-        For messages.
 
     Raises
     ------
@@ -85,10 +83,10 @@ def execute(notebook: NotebookNode, name: str) -> NotebookNode:
                 why = f"{error.ename}: {error.evalue}"
             elif isinstance(error, CellTimeoutError):
                 why = f"still running after {SECONDS:g} s"
-            raise NotebookFailed(f"{name}, cell {started[-1]}: {why}") from None
+            raise NotebookFailed(f"cell {started[-1]}: {why}") from None
     if failure := first_error(result):
         cell, shown = failure
-        raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
+        raise NotebookFailed(f"cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
 
 

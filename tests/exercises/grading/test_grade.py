@@ -242,6 +242,7 @@ RETURNED = {
     "unknown-variant": (claims(variant="no \x1b[31m such"), None, "no variant"),
     "list": ([1, 2], None, "JSON of something else"),
     "cut": ("", None, "the file is not JSON"),
+    "digits": ("", None, "the file is not JSON"),
 }
 PROCESSES = sum(marks is not None for _, marks, _ in RETURNED.values())
 
@@ -271,6 +272,8 @@ def graded(tmp_path_factory):
     pid = folder.parent / "pid"
     (folder / "leaves.ipynb").write_text(leaves.replace("PIDFILE", str(pid)), encoding="utf-8")
     (folder / "cut.ipynb").write_text(json.dumps(solved())[:500], encoding="utf-8")
+    # more of them than Python reads as a number
+    (folder / "digits.ipynb").write_text("1" * 5000, encoding="utf-8")
     write(folder / ".ipynb_checkpoints" / "loops-checkpoint.ipynb", solved())
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     listed = folder.parent / "list.csv"
@@ -459,13 +462,14 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, without_running):
 
     done = again()
     assert done.exit_code == 0
-    assert sorted(without_running) == ["cut", "list", "unknown-set", "unknown-variant"]
-    assert f"4 run, {len(RETURNED) - 4} unchanged" in done.output
+    assert sorted(without_running) == ["cut", "digits", "list", "unknown-set", "unknown-variant"]
+    assert f"5 run, {len(RETURNED) - 5} unchanged" in done.output
     assert table(written)["loops"]["note"] == graded.rows["loops"]["note"]
     (folder / "shows.ipynb").rename(folder / "renamed.ipynb")
     write(folder / "rewrites.ipynb", solved())
     again()
-    assert without_running == ["rewrites"]
+    # what is no notebook is tried again
+    assert sorted(without_running) == ["cut", "digits", "list", "rewrites"]
     assert {"renamed", "rewrites"} < set(table(written))
     # what was ended too early may come to its end
     for more in (f"--seconds {SECONDS} --again", "--seconds 99"):

@@ -35,7 +35,7 @@ REQUEST = re.compile(
 @pytest.fixture(scope="module")
 def executed():
     """The tiny set's solution, really executed."""
-    return execution.execute(solved(), "tiny")
+    return execution.execute(solved())
 
 
 @pytest.fixture
@@ -48,8 +48,8 @@ def no_kernel(monkeypatch, executed):
     """Notebooks of the tiny set come executed; the number of executions is counted."""
     calls = []
 
-    def instead(notebook, name, *_, **__):
-        calls.append(name)
+    def instead(notebook):
+        calls.append(notebook)
         result = nbformat.from_dict(notebook)
         for cell, done in zip(code(result), code(executed), strict=True):
             cell.outputs, cell.execution_count = done.outputs, done.execution_count
@@ -209,8 +209,8 @@ def test_mathml_leaves_code_alone():
 def test_a_failing_cell_is_named(monkeypatch, source, message):
     monkeypatch.setattr(execution, "SECONDS", 5)
     cells = [nbformat.v4.new_code_cell(text) for text in ("1", source, "2")]
-    with pytest.raises(NotebookFailed, match=f"here, cell {cells[1].id}: {message}"):
-        execution.execute(nbformat.v4.new_notebook(cells=cells), "here")
+    with pytest.raises(NotebookFailed, match=f"^cell {cells[1].id}: {message}"):
+        execution.execute(nbformat.v4.new_notebook(cells=cells))
 
 
 # -- jobs
@@ -289,10 +289,10 @@ def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(
     (masters / "c_duof" / "statement.md").write_text(fails, encoding="utf-8")
     without = jobs.execute
 
-    def instead(notebook, name, *_, **__):
+    def instead(notebook):
         if "1 / 0" in code(notebook)[0].source:
-            raise NotebookFailed(f"{name}, cell c-01: ZeroDivisionError: division by zero")
-        return without(notebook, name)
+            raise NotebookFailed("cell c-01: ZeroDivisionError: division by zero")
+        return without(notebook)
 
     monkeypatch.setattr(jobs, "execute", instead)  # in this process
     command = f"exercises --variant 53 --masters {masters}"
@@ -338,7 +338,7 @@ from kfcourse.exercises.notebooks.execution import execute
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in a shell's background is born deaf to it
 stop = f"import os, signal, time; os.kill({os.getpid()}, signal.SIGINT); time.sleep(60)"
 try:
-    execute(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(stop)]), "stopped")
+    execute(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(stop)]))
 except KeyboardInterrupt:
     print("interrupted")
 """
