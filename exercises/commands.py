@@ -3,7 +3,6 @@ have something to do."""
 
 from __future__ import annotations
 
-import functools
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -56,7 +55,9 @@ def _options(command: Callable) -> Callable:
         MASTERS,
         JOBS,
     ]
-    return functools.reduce(lambda decorated, option: option(decorated), reversed(options), command)
+    for option in reversed(options):
+        command = option(command)
+    return command
 
 
 @click.command()

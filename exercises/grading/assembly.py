@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,19 +19,6 @@ from kfcourse.exercises.notebooks.master import CHECK, render, student
 def generated(text: str, letter: str, opening: str) -> NotebookNode:
     """The student's notebook as it was handed out.  Not to be changed."""
     return student(render(text, exercise(letter, ast.literal_eval(opening))), {})
-
-
-def check_cells(master: NotebookNode) -> dict[str, list[str]]:
-    """Id of a check cell to the questions it asks."""
-    return {
-        cell.id: _asked(cell.source)
-        for cell in master.cells
-        if cell.cell_type == "code" and _asked(cell.source)
-    }
-
-
-def _asked(source: str) -> list[str]:
-    return [question for _, question in CHECK.findall(source)]
 
 
 class Step(NamedTuple):
@@ -57,39 +44,34 @@ def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], 
     returned notebook.  The master's check cells stay, and get the exercise as it was handed out.
     """
     cells = [cell for cell in cells if cell.code]
-    code = [(index, cell) for index, cell in enumerate(master.cells) if cell.cell_type == "code"]
-    checks = check_cells(master)
-    places, taken = _places(code, checks, cells)
-    ordered = [(index, -1, Step(cell.source, "the first cell")) for index, cell in code[:1]]
-    for index, cell in code[1:]:
-        where = (
-            f"the check of {', '.join(checks[cell.id])}"
-            if cell.id in checks
-            else f"the cell `{cell.source[:40].strip()}`"
-        )
-        if cell.id in checks:
-            names = tuple(dict.fromkeys(name for name, _ in CHECK.findall(cell.source)))
-            ordered.append(
-                (index, 0, Step(cell.source, where, False, names, tuple(checks[cell.id])))
-            )
-        elif index not in taken:
-            ordered.append((index, 0, Step(cell.source, where)))
-    own = [cell for cell in cells if cell.number in places]
-    ordered += [
+    code = {index: cell for index, cell in enumerate(master.cells) if cell.cell_type == "code"}
+    places, taken = _places(code, cells)
+    first, own, steps = min(code), [cell for cell in cells if cell.number in places], []
+    for index, cell in code.items():
+        calls = CHECK.findall(cell.source)
+        names, questions = (tuple(dict.fromkeys(call[part] for call in calls)) for part in (0, 1))
+        where = "the first cell" if index == first else f"the cell `{cell.source[:40].strip()}`"
+        if questions:
+            where = f"the check of {', '.join(questions)}"
+        if index == first or index not in taken:
+            steps.append((index, 0, Step(cell.source, where, False, names, questions)))
+    steps += [
         (places[cell.number], cell.number, Step(cell.source, cell.name, True)) for cell in own
     ]
-    return [step for *_, step in sorted(ordered, key=lambda row: row[:2])], own
+    return [step for *_, step in sorted(steps)], own
 
 
 def lost(master: NotebookNode, cells: Sequence[Cell]) -> dict[str, str]:
     """Names of asked functions whose cells did not come back as code, each with what became of
     it."""
-    defined = set[str]().union(*(_defined(cell.source) for cell in cells if cell.code))
-    back = {cell.id for cell in cells if cell.code} | {cell.answer for cell in cells if cell.code}
+    back = set[str]()
+    for cell in cells:
+        if cell.code:
+            back |= {cell.id, cell.answer, *_defined(cell.source)}
     fates = {}
     for stub in (cell for cell in master.cells if "kfcourse" in cell.metadata):
         name = stub.metadata["kfcourse"]["answer"]
-        if name not in defined and not {stub.id, name} & back:
+        if not {stub.id, name} & back:
             text = any(
                 cell.id == stub.id or f"def {name}(" in cell.source
                 for cell in cells
@@ -104,58 +86,55 @@ def lost(master: NotebookNode, cells: Sequence[Cell]) -> dict[str, str]:
 
 
 def _places(
-    code: Sequence[tuple[int, NotebookNode]], checks: Mapping[str, list[str]], cells: Sequence[Cell]
+    code: dict[int, NotebookNode], cells: Sequence[Cell]
 ) -> tuple[dict[int, int], set[int]]:
     """Number of a student's cell to the index of the master's cell that it replaces or follows; and
     those that are replaced."""
-    by_id = {cell.id: index for index, cell in code}
+    by_id = {cell.id: index for index, cell in code.items()}
     answers = {
         cell.metadata["kfcourse"]["answer"]: index
-        for index, cell in code
+        for index, cell in code.items()
         if "kfcourse" in cell.metadata
     }
     asked_at = {
-        question: by_id[name] for name, questions in checks.items() for question in questions
+        question: index
+        for index, cell in code.items()
+        for _, question in CHECK.findall(cell.source)
     }
-    unchanged = {_plain(cell.source): index for index, cell in reversed(code)}
-    of: dict[int, int] = {}
-    taken: set[int] = set()
-
+    unchanged = {_plain(cell.source): index for index, cell in reversed(code.items())}
     mine = [
         cell
         for cell in cells
         if _plain(cell.source) not in unchanged and not _only_checks(cell.source)
     ]
-    defines = {cell.number: _defined(cell.source) & set(answers) for cell in mine}
-    for name, index in answers.items():
-        candidates = [cell for cell in mine if name in defines[cell.number]]
-        if candidates:
-            best = min(
-                candidates,
-                key=lambda cell: (by_id.get(cell.id) != index, cell.answer != name, cell.number),
+    defines = {
+        cell: {answers[name] for name in _defined(cell.source) & answers.keys()} for cell in mine
+    }
+    of: dict[int, int] = {}
+    taken: set[int] = set()
+    for index in code.keys() - asked_at.values():
+        candidates = [
+            (
+                not defines[cell],
+                by_id.get(cell.id) != index,
+                answers.get(cell.answer) != index,
+                cell,
             )
-            of[best.number] = min(index, of.get(best.number, index))
-            taken.add(index)
-    for cell in mine:
-        index = answers.get(cell.answer, by_id.get(cell.id, -1))
-        if (
-            cell.number not in of
-            and not defines[cell.number]
-            and index not in taken | set(asked_at.values()) | {-1}
-        ):
-            of[cell.number] = index
+            for cell in mine
+            if index in (defines[cell] or {answers.get(cell.answer, by_id.get(cell.id, -1))})
+        ]
+        if candidates:
+            best = min(candidates)[-1].number
+            of[best] = min(index, of.get(best, index))
             taken.add(index)
 
     last = -1
-    kept = {cell.number for cell in mine}
     for cell in cells:
-        if cell.number in of:
-            last = of[cell.number]
-        elif cell.number in kept:
-            of[cell.number] = last
+        if cell in defines:
+            last = of.setdefault(cell.number, last)
         else:  # a cell of the master's, as it was
-            asked = [asked_at[question] for question in _asked(cell.source) if question in asked_at]
-            last = asked[-1] if asked else unchanged.get(_plain(cell.source), last)
+            asked = [asked_at[name] for _, name in CHECK.findall(cell.source) if name in asked_at]
+            last = [unchanged.get(_plain(cell.source), last), *asked][-1]
     return of, taken
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import queue
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import IO, Any
 
 from kfcourse.exercises.grading.values import LARGEST, ProtocolError
@@ -65,24 +64,11 @@ class PatientChannel(Channel):
 
     def __init__(self, source: IO[bytes], sink: IO[bytes]):
         super().__init__(source, sink)
-        # a flood waits in the pipe
-        self._queue: queue.Queue[dict[str, Any] | Exception] = queue.Queue(maxsize=100)
-        threading.Thread(target=self._forward, daemon=True).start()
-
-    def _forward(self) -> None:
-        while True:
-            try:
-                self._queue.put(super().receive())
-            except Exception as error:
-                self._queue.put(error)
-                return
+        self._receiver = ThreadPoolExecutor(1)
+        self._next = self._receiver.submit(self.receive)  # a flood waits in the pipe
 
     def wait(self, until: float) -> dict[str, Any]:
         """The next message; TimeoutError if none is there at that time of `time.monotonic`."""
-        try:
-            message = self._queue.get(timeout=max(until - time.monotonic(), 0.0))
-        except queue.Empty:
-            raise TimeoutError from None
-        if isinstance(message, Exception):
-            raise message
+        message = self._next.result(max(until - time.monotonic(), 0.0))
+        self._next = self._receiver.submit(self.receive)
         return message

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import secrets
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import click
 
 from kfcourse.exercises.grading import pool, sandbox
 from kfcourse.exercises.grading.marking import Setting
-from kfcourse.exercises.grading.owners import owner, same_code
+from kfcourse.exercises.grading.owners import same_code
 from kfcourse.exercises.grading.report import write_report
 from kfcourse.exercises.grading.results import (
     FAILED,
@@ -23,14 +22,14 @@ from kfcourse.exercises.grading.results import (
     Grade,
     line,
     read_lines,
-    write_lines,
     write_table,
 )
 from kfcourse.exercises.grading.sandbox import PROTECTION
-from kfcourse.exercises.grading.submissions import Returned, Unreadable, read_document, returned
+from kfcourse.exercises.grading.submissions import returned
 from kfcourse.exercises.grading.weights import Credit
 from kfcourse.exercises.notebooks.course_list import Student, read_assignment
 from kfcourse.exercises.notebooks.texts import clean
+from kfcourse.files import save
 from kfcourse.lab.variants import chosen_variants
 
 
@@ -53,7 +52,7 @@ def grade_folder(
     graded."""
     course = None if students is None else _course(students, variants_file)
     folder = folder.resolve()
-    work = returned(folder, seconds, variants_file, masters, _given(course))
+    work = returned(folder, seconds, variants_file, masters, course or ())
     if not work:
         raise ValueError(f"no notebooks (*.ipynb) in {folder}")
     table = out or folder.with_name(f"{folder.name}-grades.csv")
@@ -68,23 +67,43 @@ def grade_folder(
                 f"{path} is inside of what was returned: a student may have put it there; name "
                 f"another place"
             )
-    salt, protection = seed or secrets.token_hex(8), ["nothing was run"]
-
-    def run(new: Sequence[Returned]) -> Iterator[Grade]:
-        with pool.place(folder, masters, kind) as box:
-            problem = "" if kind == "none" else sandbox.problem(box)
-            if problem or kind == "none":
-                _warn(problem)
-                box = replace(box, kind="none")
-            protection[:] = [PROTECTION[box.kind]]
-            yield from pool.graded(new, Setting(box, salt), workers)
-
-    grades, old = grade_all(work, table, again, run)
+    salt, protection = seed or secrets.token_hex(8), "nothing was run"
+    lines = table.with_suffix(".jsonl")
+    known = {} if again else read_lines(lines)
+    grades = [
+        replace(known[notebook.digest], name=notebook.name)
+        for notebook in work
+        if notebook.digest in known
+    ]
+    new = [notebook for notebook in work if notebook.digest not in known]
+    save("".join(map(line, grades)), lines)
+    try:
+        if new:
+            with (
+                pool.place(folder, masters, kind) as box,
+                lines.open("a", encoding="utf-8") as file,
+            ):
+                problem = "" if kind == "none" else sandbox.problem(box)
+                if problem or kind == "none":
+                    _warn(problem)
+                    box = replace(box, kind="none")
+                protection = PROTECTION[box.kind]
+                for grade in pool.graded(new, Setting(box, salt), workers):
+                    # at once: an interrupted run goes on where it was
+                    file.write(line(grade))
+                    file.flush()
+                    grades.append(grade)
+    finally:
+        waiting = {notebook.name for notebook in work} - {grade.name for grade in grades}
+        ended = ("the run ended before it was graded",)
+        write_table([*grades, *(Grade(name, FAILED, notes=ended) for name in waiting)], table)
+    grades.sort(key=lambda grade: grade.name)
     _show(grades)
-    click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
-    click.echo(f"Sandbox: {protection[0]}\nHidden arguments: --seed {salt} repeats them")
+    old = len(work) - len(new)
+    click.echo(f"\n{len(new)} run, {old} unchanged since the last table. Table: {table}")
+    click.echo(f"Sandbox: {protection}\nHidden arguments: --seed {salt} repeats them")
     if students or report:
-        persons = write_report(grades, course, pages, protection[0], Credit(parts, follow_on))
+        persons = write_report(grades, course, pages, protection, Credit(parts, follow_on))
         click.echo(f"\nReport of {len(persons)} students: {pages / 'overview.html'}")
         for person in persons:
             if person.flags:
@@ -120,62 +139,6 @@ def _course(path: Path, variants_file: Path | None) -> list[Student]:
                 f"name the file that you handed out with --variants; known are {', '.join(known)}"
             )
     return course
-
-
-def _given(course: Sequence[Student] | None) -> Callable[[str, Path], str]:
-    """The variant that was given to the student of a notebook; nothing without a list, or if the
-    student is not in it."""
-
-    def given(name: str, path: Path) -> str:
-        whose = owner(Grade(name, ""), course or ())
-        if whose is None and course:
-            with suppress(Unreadable):  # told when it is graded
-                claim = read_document(path).get("metadata", {}).get("kfcourse")
-                if isinstance(claim, dict):
-                    whose = owner(Grade(name, "", student=str(claim.get("student"))), course)
-        return whose.variant if whose else ""
-
-    return given
-
-
-def grade_all(
-    work: Sequence[Returned],
-    table: Path,
-    again: bool,
-    run: Callable[[Sequence[Returned]], Iterator[Grade]],
-) -> tuple[list[Grade], int]:
-    """Grade what is new, and write each grade when it comes: an interrupted run goes on where it
-    was.
-
-    Beside the table, with the ending `.jsonl`, stand the grades; the table is made from them,
-    however the run ends.
-
-    Returns
-    -------
-    grades, old : list of Grade, int
-        By name; how many an earlier run had graded.
-    """
-    lines = table.with_suffix(".jsonl")
-    known = {} if again else read_lines(lines)
-    grades = [
-        replace(known[work_.digest], name=work_.name) for work_ in work if work_.digest in known
-    ]
-    old, new = len(grades), [work_ for work_ in work if work_.digest not in known]
-    write_lines(grades, lines)
-    waiting = {
-        work_.name: Grade(work_.name, FAILED, notes=("the run ended before it was graded",))
-        for work_ in new
-    }
-    try:
-        with lines.open("a", encoding="utf-8") as file:
-            for grade in run(new) if new else ():
-                file.write(line(grade))
-                file.flush()
-                grades.append(grade)
-                waiting.pop(grade.name)
-    finally:
-        write_table([*grades, *waiting.values()], table)
-    return sorted(grades, key=lambda grade: grade.name), old
 
 
 def _show(grades: Sequence[Grade]) -> None:

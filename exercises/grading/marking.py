@@ -13,6 +13,7 @@ import hashlib
 import io
 import re
 import tokenize
+from collections import defaultdict
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -38,7 +39,6 @@ from kfcourse.exercises.grading.results import (
 from kfcourse.exercises.grading.running import (
     KILLED,
     WHOLE,
-    Answer,
     Kernel,
     Killed,
     Stopped,
@@ -49,6 +49,7 @@ from kfcourse.exercises.grading.submissions import (
     Cell,
     Returned,
     cells_of,
+    claim_of,
     claimed,
     read_document,
     syntax,
@@ -87,9 +88,8 @@ def grade(work: Returned, setting: Setting, start: Any = Kernel) -> Grade:
     try:
         document = read_document(work.path)
         cells = cells_of(document)
-        code = [cell for cell in cells if cell.code]
-        claim = document.get("metadata", {}).get("kfcourse") or _claim(code)
-        if claim is None:
+        claim = claim_of(document) or _claim(cells)
+        if not claim:
             return Grade(work.name, OTHER, digest=work.digest)
         return _grade(work, cells, claim, setting, start)
     except OutOfTime:
@@ -103,23 +103,26 @@ def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
     """Set and variant, a name or a table's, that a notebook without metadata opens."""
     opening = re.search(
         r"""\bexercise\(\s*["'](\w+)["'](?:,\s*(?:variant=)?(?:{'name':\s*)?["']([^"']+))?""",
-        "\n".join(cell.source for cell in cells),
+        "\n".join(cell.source for cell in cells if cell.code),
     )
     return opening and {"set": opening[1], "variant": opening[2] or "53"}
 
 
 def _grade(
-    work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, start: Any
+    work: Returned, cells: Sequence[Cell], claim: Mapping[str, Any], setting: Setting, start: Any
 ) -> Grade:
     with time_limit(WHOLE * work.seconds):
         exercise, looks = claimed(claim, work.variants_file, work.variant)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
         starting = start(setting.place, exercise, work.seconds)
     steps, own = assembled(master, cells)
-    marking = Marking(exercise, setting.salt, lost(master, cells))
+    functions = {question.function: name for name, question in exercise.questions.items()}
+    gone = {
+        functions[name]: fate for name, fate in lost(master, cells).items() if name in functions
+    }
+    marking = Marking(exercise, setting.salt, gone)
     with starting as kernel:
         marking.run(kernel, steps)
-    functions = {question.function for question in exercise.questions.values()}
     partly = any(result.status == NOT_GRADED for result in marking.results.values())
     return Grade(
         work.name,
@@ -130,7 +133,7 @@ def _grade(
         tuple(dict.fromkeys([*marking.notes, *marking.errors[:2], *marking.reasons()])),
         tuple(dict.fromkeys([*looks, *marking.looks(), *strange_lines(own, master)])),
         "" if partly else work.digest,
-        clean(str(claim.get("student", ""))) if isinstance(claim, dict) else "",
+        clean(str(claim.get("student", ""))),
         code_of(own, functions),
     )
 
@@ -165,18 +168,14 @@ class Marking:
     """
 
     def __init__(self, exercise: Exercise, salt: str, gone: Mapping[str, str] | None = None):
-        self._exercise, self._salt = exercise, salt
-        named = {question.function: name for name, question in exercise.questions.items()}
-        self._gone = {
-            named[function]: fate for function, fate in (gone or {}).items() if function in named
-        }
+        self._exercise, self._salt, self._gone = exercise, salt, gone or {}
         self.results: dict[str, Result] = {}
         for name in exercise.questions:
             self._says(name, NOT_RUN, "not run: is there an error in a cell before it?")
         self.notes = [f"the cell of {name} {fate}" for name, fate in self._gone.items()]
         self.errors: list[str] = []
-        self._reasons: dict[str, list[str]] = {}
-        self._failed: dict[str, list[str]] = {}
+        self._reasons: dict[str, list[str]] = defaultdict(list)
+        self._failed: dict[str, list[str]] = defaultdict(list)
         self._past = Attempts()
 
     def run(self, kernel: Kernel, steps: Iterable[Step]) -> None:
@@ -185,15 +184,12 @@ class Marking:
             try:
                 ran = kernel.cell(step.source, step.names)
             except Stopped as reason:
-                why = f"{step.where}: {reason}"
-                waiting = [n for n, result in self.results.items() if result.status == NOT_RUN]
-                for name in waiting:
-                    # what would have come is not known
-                    if isinstance(reason, Killed):
-                        self._not_graded(name, why)
-                    else:
-                        self._not_run(name, why)
-                if not isinstance(reason, Killed):
+                why, killed = f"{step.where}: {reason}", isinstance(reason, Killed)
+                for name, result in self.results.items():
+                    if result.status == NOT_RUN:
+                        # what would have come is not known
+                        (self._not_graded if killed else self._not_run)(name, why)
+                if not killed:
                     self.notes.append(why)
                 return
             if ran.error and not ran.stub and (step.own or "import " in step.source):
@@ -201,39 +197,33 @@ class Marking:
             for name in step.questions:
                 if ran.error:
                     self._not_run(name, ran.error)
-                    self._reasons.setdefault(ran.error, []).append(name)
+                    self._reasons[ran.error].append(name)
                 elif name in ran.answers:
                     self._check(name, kernel, ran.answers[name])
 
     def _check(self, name: str, kernel: Kernel, kind: str) -> None:
         question = self._exercise.questions[name]
-        answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
+        answer = type(kind, (Other,), {})() if kind else kernel.answer(name)
         asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
         result = check(question, asked, answer, CHECK, self._past)
-        if getattr(answer, "killed", False):
-            self._not_graded(name, KILLED)
-            return
-        if result.status == NOT_CHECKED:
-            self._not_graded(name, f"{TELL_US}: {result.trouble}")
+        if result.message == KILLED or result.status == NOT_CHECKED:
+            self._not_graded(name, f"{TELL_US}: {result.trouble}" if result.trouble else KILLED)
             return
         if result.trouble:
             trouble = f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}"
-            self._failed.setdefault(trouble, []).append(name)
+            self._failed[trouble].append(name)
         if result.status == MISSING and self._gone:
-            gone = self._gone.get(name)
-            others = ", ".join(other for other in self._gone if other != name)
-            says = (
-                f"its cell {gone}"
-                if gone
-                else f"{result.message}, or stands on what is not there: the cell of {others}"
-            )
+            says = f"{result.message}, or stands on what is not there: the cell of "
+            says += ", ".join(self._gone)
+            if name in self._gone:
+                says = f"its cell {self._gone[name]}"
             result = replace(result, message=says)
         self.results[name] = result
         if result.status == UNUSABLE:
-            self._reasons.setdefault(result.message, []).append(name)
+            self._reasons[result.message].append(name)
         elif result.status == WRONG and result.diagnosis:
             words = (in_words(question, mistake) for mistake in result.diagnosis)
-            self._reasons.setdefault(", ".join(words), []).append(name)
+            self._reasons[", ".join(words)].append(name)
 
     def _says(self, name: str, status: str, message: str) -> None:
         self.results[name] = Result(name, self._exercise.questions[name].title, status, message)
@@ -244,7 +234,7 @@ class Marking:
 
     def _not_graded(self, name: str, reason: str) -> None:
         self._says(name, NOT_GRADED, LOOKED_AT)
-        self._failed.setdefault(f"not graded: {reason}", []).append(name)
+        self._failed[f"not graded: {reason}"].append(name)
 
     def looks(self) -> list[str]:
         """Which answers are not graded, and why."""

@@ -42,8 +42,8 @@ def words(text: str) -> list[str]:
     return re.sub(r"[\W_]+", " ", unicodedata.normalize("NFC", text)).casefold().split()
 
 
-def owner(grade: Grade, students: Sequence[Student]) -> Student | None:
-    """Whose notebook it is: by the names in its path, else by whom it was handed out to; None if
+def owner(path: str, whom: object, students: Iterable[Student]) -> Student | None:
+    """Whose notebook it is: by the names in its path, else by `whom` it was handed out to; None if
     that is not clear.
 
     A student is found in a folder or file that has all words of the name, in any order:
@@ -51,15 +51,13 @@ def owner(grade: Grade, students: Sequence[Student]) -> Student | None:
     learning platform.  Of several, those whose group is in the path go first, then those with the
     longest names.
     """
-    parts = [set(words(part)) for part in PurePosixPath(grade.name).with_suffix("").parts]
+    parts = [set(words(part)) for part in PurePosixPath(path).with_suffix("").parts]
     everything = set().union(*parts)
     named = [
         student for student in students if any(set(words(student.name)) <= part for part in parts)
     ]
     if not named:
-        named = [
-            student for student in students if grade.student == f"{student.name}, {student.group}"
-        ]
+        named = [student for student in students if whom == f"{student.name}, {student.group}"]
 
     def rank(student: Student) -> tuple[bool, int]:
         return set(words(student.group)) <= everything, len(words(student.name))
@@ -91,7 +89,7 @@ def people(
     for grade in sorted(grades, key=lambda grade: grade.name):
         if grade.status == OTHER:
             continue
-        whose = of_folder(grade) if students is None else owner(grade, students)
+        whose = of_folder(grade) if students is None else owner(grade.name, grade.student, students)
         if whose is None:
             strangers.append(grade)
         else:

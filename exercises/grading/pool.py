@@ -16,9 +16,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib import resources
 from pathlib import Path
-from queue import SimpleQueue
 
 from tqdm import tqdm
 
@@ -28,7 +26,7 @@ from kfcourse.exercises.grading.marking import Setting
 from kfcourse.exercises.grading.results import FAILED, Grade
 from kfcourse.exercises.grading.running import MEMORY, START, WHOLE
 from kfcourse.exercises.grading.sandbox import Sandbox
-from kfcourse.exercises.grading.staging import answers, stage
+from kfcourse.exercises.grading.staging import packages, stage
 from kfcourse.exercises.grading.submissions import Returned
 from kfcourse.limits import limit_process
 
@@ -98,32 +96,21 @@ def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Sandbox]:
     the rest."""
     with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
         staged = stage(Path(made).resolve())
-        hidden = [
-            Path(str(resources.files("kfcourse"))),
-            *answers(),
-            folder,
-            *([masters] if masters else []),
-        ]
+        hidden = [*packages(), folder, *([masters] if masters else [])]
         yield Sandbox(kind, staged, tuple(str(path.resolve()) for path in hidden))
 
 
 def graded(works: Sequence[Returned], setting: Setting, workers: int) -> Iterator[Grade]:
     """The grades as they come, so many notebooks at once, with a progress bar."""
-    graders = [Grader(setting) for _ in range(workers)]
-    free: SimpleQueue[Grader] = SimpleQueue()
-    for grader in graders:
-        free.put(grader)
+    own, graders = threading.local(), list[Grader]()
 
-    def grade(work: Returned) -> Grade:
-        grader = free.get()
-        try:
-            return grader(work)
-        finally:
-            free.put(grader)
+    def begin() -> None:
+        own.grader = Grader(setting)
+        graders.append(own.grader)
 
-    threads = ThreadPoolExecutor(workers)
+    threads = ThreadPoolExecutor(workers, initializer=begin)
     try:
-        tasks = [threads.submit(grade, work) for work in works]
+        tasks = [threads.submit(lambda work: own.grader(work), work) for work in works]
         for task in tqdm(
             as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None
         ):

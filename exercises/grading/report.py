@@ -67,16 +67,29 @@ def write_report(
     persons, strangers = people(grades, students, credit)
     letters = known_sets(persons)
     folder.mkdir(parents=True, exist_ok=True)
-    for name, rows in (
-        ("students", student_rows(persons, letters, credit)),
-        ("questions", question_rows(persons, letters)),
-    ):
+    students_rows = student_rows(persons, letters, credit)
+    questions_rows = question_rows(persons, letters)
+    for name, rows in (("students", students_rows), ("questions", questions_rows)):
         write_csv(list(rows[0]) if rows else [], rows, folder / f"{name}.csv")
     pages = feedback_pages(persons)
     for person, page in zip(persons, pages, strict=True):
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         save(feedback(person, letters, credit), folder / page)
-    save(overview(persons, pages, strangers, letters, protection, credit), folder / "overview.html")
+    linked = zip(students_rows, (page.as_posix() for page in pages), strict=True)
+    overview = written(
+        "overview",
+        students=sorted(linked, key=lambda row: (row[0]["group"], row[0]["name"])),
+        persons=persons,
+        same=same_code(persons),
+        strangers=strangers,
+        letters=letters,
+        questions=questions_rows,
+        kinds=list(KINDS.values()),
+        weights=WEIGHTS,
+        credit=credit,
+        protection=protection,
+    )
+    save(overview, folder / "overview.html")
     return persons
 
 
@@ -99,24 +112,15 @@ def student_rows(
     """A row for each student: points of each set, of each level, and in all; what to look at."""
     rows = []
     for person in persons:
-        student, grades = person.student, person.grades
-        came = list(grades.values())
-        row: dict[str, Any] = {
-            "name": student.name,
-            "group": student.group,
-            "variant": student.variant,
-        }
-        row |= {
-            f"set {letter}": points([grades[letter]], credit) if letter in grades else ""
-            for letter in letters
-        }
-        row |= {level: points(came, credit, level) for level in WEIGHTS}
-        row |= {
-            "points": points(came, credit),
-            "of": possible(letters),
-            "look at": "; ".join(person.flags),
-        }
-        rows.append(row)
+        name, group, variant, _ = person.student
+        row: dict[str, Any] = {"name": name, "group": group, "variant": variant}
+        for letter in letters:
+            back = letter in person.grades
+            row[f"set {letter}"] = points([person.grades[letter]], credit) if back else ""
+        for level in WEIGHTS:
+            row[level] = points(person.grades.values(), credit, level)
+        row["points"] = points(person.grades.values(), credit)
+        rows.append(row | {"of": possible(letters), "look at": "; ".join(person.flags)})
     return rows
 
 
@@ -132,14 +136,14 @@ def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dic
         mistakes = Counter(
             in_words(question, mistake) for result in results for mistake in result.diagnosis
         ).most_common()
-        row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
-        row |= {label: counts[mark] for mark, label in KINDS.items()}
-        row |= {
-            "in part": sum(0 < result.share < 1 for result in results),
-            "follows": sum(bool(result.follows) for result in results),
-        }
         rows.append(
-            row | {"mistakes": "; ".join(f"{count}: {mistake}" for mistake, count in mistakes)}
+            {"question": name, "title": question.title, "level": question.level}
+            | {label: counts[mark] for mark, label in KINDS.items()}
+            | {
+                "in part": sum(0 < result.share < 1 for result in results),
+                "follows": sum(bool(result.follows) for result in results),
+                "mistakes": "; ".join(f"{count}: {mistake}" for mistake, count in mistakes),
+            }
         )
     return rows
 
@@ -164,32 +168,4 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
         levels=[(level, row[level], possible(letters, level)) for level in WEIGHTS],
         signs=SIGNS,
         weights=WEIGHTS,
-    )
-
-
-def overview(
-    persons: Sequence[Person],
-    pages: Sequence[Path],
-    strangers: Sequence[Grade],
-    letters: Sequence[str],
-    protection: str,
-    credit: Credit = USUAL,
-) -> str:
-    """The lecturer's page: students with what to look at, who has the same code, questions with
-    their mistakes."""
-    rows = zip(
-        student_rows(persons, letters, credit), (page.as_posix() for page in pages), strict=True
-    )
-    return written(
-        "overview",
-        students=sorted(rows, key=lambda row: (row[0]["group"], row[0]["name"])),
-        persons=persons,
-        same=same_code(persons),
-        strangers=strangers,
-        letters=letters,
-        questions=question_rows(persons, letters),
-        kinds=list(KINDS.values()),
-        weights=WEIGHTS,
-        credit=credit,
-        protection=protection,
     )

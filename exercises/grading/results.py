@@ -4,7 +4,7 @@ spreadsheets is made."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -12,7 +12,6 @@ from pathlib import Path
 from kfcourse.exercises.checks import Question, Result, sets
 from kfcourse.exercises.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.exercises.notebooks.texts import write_csv
-from kfcourse.files import save
 
 # of an answer: an error before it; the grader could not compare it
 NOT_RUN, NOT_GRADED = "not run", "not graded"
@@ -35,9 +34,9 @@ class Grade:
     results : dict
         Question to what was said of the answer; its status is a mark: "passed", "wrong",
         "unusable", "not implemented", "not run" or "not graded".
-    notes : tuple of str
+    notes : sequence of str
         Where it stopped, what the wrong answers look like.
-    looks : tuple of str
+    looks : sequence of str
         What a lecturer should look at.
     digest : str
         Empty if it was not graded, or in part: it is tried again.
@@ -52,8 +51,8 @@ class Grade:
     letter: str = ""
     variant: str = ""
     results: Mapping[str, Result] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    looks: tuple[str, ...] = ()
+    notes: Sequence[str] = ()
+    looks: Sequence[str] = ()
     digest: str = ""
     student: str = ""
     work: str = ""
@@ -91,23 +90,10 @@ def read_lines(path: Path) -> dict[str, Grade]:
         for text in path.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, TypeError, LookupError, AttributeError):
                 fields = json.loads(text)
-                fields["results"] = {
-                    name: Result(**_tuples(parts)) for name, parts in fields["results"].items()
-                }
+                results = {name: Result(**parts) for name, parts in fields["results"].items()}
                 if fields["digest"]:
-                    grades[fields["digest"]] = Grade(**_tuples(fields))
+                    grades[fields["digest"]] = Grade(**fields | {"results": results})
     return grades
-
-
-def _tuples(fields: Mapping) -> dict:
-    return {
-        name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
-    }
-
-
-def write_lines(grades: Iterable[Grade], path: Path) -> None:
-    """Write the lines of all grades, completely or not at all."""
-    save("".join(map(line, grades)), path)
 
 
 def write_table(grades: Iterable[Grade], path: Path) -> None:
@@ -126,9 +112,14 @@ def write_table(grades: Iterable[Grade], path: Path) -> None:
     ]
     rows = []
     for grade in sorted(grades, key=lambda grade: grade.name):
-        passed, of = (grade.passed, len(grade.marks)) if grade.marks else ("", "")
-        marks = [*grade.marks.values(), *[""] * (len(questions) - len(grade.marks))]
-        head = [grade.name, grade.status, grade.letter, grade.variant]
-        row = [*head, *marks, passed, of, grade.note, grade.student]
-        rows.append(dict(zip(columns, row, strict=True)))
+        row = {
+            "notebook": grade.name,
+            "status": grade.status,
+            "set": grade.letter,
+            "variant": grade.variant,
+            "note": grade.note,
+            "student": grade.student,
+        }
+        counts = {"passed": grade.passed, "of": len(grade.marks)} if grade.marks else {}
+        rows.append(row | dict(zip(questions, grade.marks.values(), strict=False)) | counts)
     write_csv(columns, rows, path)

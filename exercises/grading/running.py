@@ -131,13 +131,19 @@ class Kernel:
                 else f"still running after {self.seconds:g} s"
             ) from None
         self._done.append(message)
-        answers = reply.get("answers")
-        types = (
-            {str(name): str(kind or "") for name, kind in answers.items()}
-            if isinstance(answers, dict)
-            else {}
-        )
-        return Ran(clean(str(reply.get("error") or "")), bool(reply.get("stub")), types)
+        types = {name: str(kind or "") for name, kind in reply["answers"].items()}
+        return Ran(clean(str(reply["error"] or "")), bool(reply["stub"]), types)
+
+    def answer(self, question: str) -> Callable:
+        """The function handed in for a question, called in its process."""
+
+        def called(*arguments: Any) -> Any:
+            try:
+                return self.ask(question, arguments, min(ANSWER, self.seconds))
+            except Stopped as reason:
+                raise Unusable(str(reason)) from None
+
+        return called
 
     def ask(self, question: str, arguments: tuple, seconds: float) -> Any:
         """The value of the function handed in for a question.
@@ -150,17 +156,8 @@ class Kernel:
         Stopped
         """
         functions: list[Callable] = []
-
-        def number(function: Callable) -> int:
-            functions.append(function)
-            return len(functions) - 1
-
-        message = {
-            "do": "ask",
-            "question": question,
-            "arguments": encode(arguments, number),
-            "seconds": seconds,
-        }
+        data = encode(arguments, functions)
+        message = {"do": "ask", "question": question, "arguments": data, "seconds": seconds}
         try:
             reply = self._request(message, seconds + GRACE, functions)
             if "value" in reply:
@@ -213,34 +210,10 @@ class Kernel:
 def _called(reply: Mapping[str, Any], functions: Sequence[Callable]) -> dict[str, Any]:
     """What a function of ours makes of the notebook's values."""
     try:
-        values, named = decode(reply.get("values")), reply.get("named") or {}
-        number = reply["call"]
-        if (
-            type(number) is not int
-            or not 0 <= number < len(functions)
-            or not isinstance(values, tuple)
-        ):
-            raise ProtocolError("a call of nothing")
-        given = {str(name): decode(value) for name, value in named.items()}
-        return {"value": encode(functions[number](*values, **given))}
-    except Exception as error:  # of values of the student's
+        named = {name: decode(value) for name, value in reply["named"].items()}
+        return {"value": encode(functions[reply["call"]](*decode(reply["values"]), **named))}
+    except Exception as error:  # of values of the student's, or of a call of nothing
         return {"raises": type(error).__name__, "says": clean(str(error), 300)}
-
-
-class Answer:
-    """A function of a notebook's, called in its process."""
-
-    def __init__(self, kernel: Kernel, question: str):
-        self._kernel, self._question = kernel, question
-        self._seconds = min(ANSWER, kernel.seconds)
-        self.killed = False  # while it was called
-
-    def __call__(self, *arguments: Any) -> Any:
-        try:
-            return self._kernel.ask(self._question, arguments, self._seconds)
-        except Stopped as reason:
-            self.killed |= isinstance(reason, Killed)
-            raise Unusable(str(reason)) from None
 
 
 KEPT = re.compile(
@@ -251,21 +224,14 @@ KEPT = re.compile(
 
 def environment(folder: Path, stage: Path) -> dict[str, str]:
     """Environment variables of a notebook's process: few of ours, and a home of its own."""
-    fonts = folder / ".matplotlib"
-    fonts.mkdir()
-    for path in (stage / FONTS).iterdir():
-        shutil.copy(path, fonts)
-    return {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)} | {
+    fonts = shutil.copytree(stage / FONTS, folder / ".matplotlib")
+    kept = {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)}
+    homes = dict.fromkeys(("HOME", "USERPROFILE", "TMPDIR", "TEMP"), str(folder))
+    switches = ("PYTHONDONTWRITEBYTECODE", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    return (kept | homes | dict.fromkeys(switches, "1")) | {
         "PYTHONPATH": str(stage),  # nothing of yours
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "HOME": str(folder),
-        "USERPROFILE": str(folder),
         "IPYTHONDIR": str(folder / ".ipython"),
         "MPLCONFIGDIR": str(fonts),
         "MPLBACKEND": "agg",
-        "TMPDIR": str(folder),
-        "TEMP": str(folder),
         "PYTHONUSERBASE": site.getuserbase(),
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
     }

@@ -98,14 +98,10 @@ def was_killed(process: subprocess.Popen) -> bool:
 
 def end(process: subprocess.Popen) -> None:
     """End a process with all that is still below it or in its session."""
-    end_with_all_below(process.pid)
-    if os.name == "posix":
-        with suppress(ProcessLookupError, PermissionError):
+    with suppress(OSError), process:  # which closes its pipes, and waits
+        end_with_all_below(process.pid)
+        if os.name == "posix":
             os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    for pipe in (process.stdin, process.stdout):
-        with suppress(OSError):
-            pipe.close()  # type: ignore[union-attr]
 
 
 def end_with_all_below(pid: int) -> None:

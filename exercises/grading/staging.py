@@ -17,11 +17,10 @@ NEEDED = (
     "checks/*.py",
     "derivations/*.py",
     *(f"grading/{name}.py" for name in ("__init__", "channel", "session", "values")),
+    "sets/*/companion.py",  # what the notebooks of a set import; never a key
 )
 ANSWERS = "derivations/worked.py"  # writes right derivations
-EXERCISES = "kfcourse.exercises"
 FONTS = "fonts"  # on the stage: those that matplotlib has found
-COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
 
 REGISTRY = '''"""The exercise sets without their questions: what a notebook is graded with."""
 
@@ -61,26 +60,17 @@ def stage(folder: Path) -> Path:
     Path
         What belongs on the path.
     """
-    own, machinery = (Path(str(resources.files(name))) for name in ("kfcourse", EXERCISES))
+    own, machinery = packages()
     target = folder / "kfcourse"
     shutil.copytree(own, target, ignore=lambda at, names: LEFT_OUT if Path(at) == own else ())
-    registered = list(sets().values())
-    needed = {
-        target / "exercises" / path.relative_to(machinery): path
-        for pattern in NEEDED
-        for path in machinery.glob(pattern)
-        if path != machinery / ANSWERS
-    } | {
-        target / "exercises" / "sets" / set_.folder.name / COMPANIONS: set_.folder / COMPANIONS
-        for set_ in registered
-        if (set_.folder / COMPANIONS).exists()
-    }
-    for copied, path in needed.items():
-        copied.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(path, copied)
+    for path in (path for pattern in NEEDED for path in machinery.glob(pattern)):
+        copied = target / "exercises" / path.relative_to(machinery)
+        if path != machinery / ANSWERS:
+            copied.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, copied)
     rows = [
         (set_.letter, set_.title, set_.folder.name, set_.about_variant, set_.angles)
-        for set_ in registered
+        for set_ in sets().values()
     ]
     (target / "exercises" / "sets" / "__init__.py").write_text(
         REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8"
@@ -99,8 +89,7 @@ def _cache_of_matplotlib() -> Path:
     return Path(matplotlib.get_cachedir())
 
 
-def answers() -> list[Path]:
-    """Folders that hold the right answers: no notebook may read them."""
-    return sorted(
-        {set_.folder.parent for set_ in sets().values()} | {Path(str(resources.files(EXERCISES)))}
-    )
+def packages() -> list[Path]:
+    """Folders of the package and of the exercises, with the right answers: no notebook may read
+    them."""
+    return [Path(str(resources.files(name))) for name in ("kfcourse", "kfcourse.exercises")]

@@ -4,18 +4,19 @@ be."""
 from __future__ import annotations
 
 import ast
-import errno
 import hashlib
 import json
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 from kfcourse.exercises.checks import Exercise, sets
+from kfcourse.exercises.grading.owners import owner
+from kfcourse.exercises.notebooks.course_list import Student
 from kfcourse.exercises.notebooks.texts import clean
 from kfcourse.files import package_digest
 from kfcourse.lab.variants import VariantError, find_variant
@@ -43,7 +44,6 @@ class Returned:
     Attributes
     ----------
     path : Path
-        Absolute, as the others: another process may have another working directory.
     name : str
         The path in the folder, with slashes; what is not UTF-8 in it is written as `\\xNN`.
     digest : str
@@ -73,15 +73,14 @@ def returned(
     seconds: float = SECONDS,
     variants_file: Path | None = None,
     masters: Path | None = None,
-    given: Callable[[str, Path], str] = lambda name, path: "",
+    students: Sequence[Student] = (),
 ) -> list[Returned]:
     """The notebooks in a folder and the folders in it, and what may be one and cannot be read:
     links, archives, exports.
 
-    `given` says which variant the student of a notebook was given, from its name and path.
+    `students` are those of the course list: a notebook of theirs is for the variant that they were
+    given.
     """
-    folder, masters = folder.absolute(), masters and masters.absolute()
-    variants_file = variants_file and variants_file.absolute()
     setting = hashlib.sha256(f"{package_digest()}{seconds}".encode())
     for path in (
         *sorted(masters.glob("*/statement.md") if masters else []),
@@ -91,12 +90,13 @@ def returned(
     works = []
     for path, problem in sorted(_handed_in(folder)):
         name = os.fsencode(path.relative_to(folder).as_posix()).decode("utf-8", "backslashreplace")
-        variant = "" if problem else given(name, path)
-        digest = setting.copy()
-        digest.update(f"{variant}\n".encode())
-        with suppress(OSError):  # told when it is graded
-            digest.update(b"" if problem else _content(path))
-        key = "" if problem else digest.hexdigest()
+        digest, key, variant = setting.copy(), "", ""
+        if not problem:
+            with suppress(Unreadable):  # told when it is graded
+                whose = owner(name, claim_of(read_document(path)).get("student"), students)
+                variant = whose.variant if whose else ""
+                digest.update(variant.encode() + b"\n" + _content(path))
+                key = digest.hexdigest()
         works.append(Returned(path, name, key, seconds, variants_file, masters, variant, problem))
     return works
 
@@ -112,9 +112,6 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
         for name in files:
             path = Path(at, name)
             kind = path.suffix.lower()
-            notebook = path.with_name(
-                path.name[: len(path.name) - len(kind)].removesuffix(".ipynb") + ".ipynb"
-            )
             if path.parent.name == ".ipynb_checkpoints" or name.startswith("._"):
                 continue  # Jupyter's, or a Mac's
             if kind == ".ipynb":
@@ -122,7 +119,7 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
             elif path.stem.lower().endswith(".ipynb"):
                 if kind not in (".bak", ".swp"):
                     yield path, RENAMED
-            elif kind in NOT_READ and not notebook.exists():
+            elif kind in NOT_READ and not path.with_suffix(".ipynb").exists():
                 yield path, NOT_READ[kind]
     for error in unread:
         yield Path(error.filename), f"a folder that cannot be read: {error.strerror}"
@@ -138,12 +135,13 @@ def _unread(path: Path, inside: PurePath) -> str:
 
 
 def _content(path: Path) -> bytes:
-    """Bytes of a returned file; OSError if it has become a link, or is too large to be one."""
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(handle, "rb") as file:
-        if os.fstat(handle).st_size > LARGEST:
-            raise OSError(errno.EFBIG, f"not read: larger than {LARGEST // 2**20} MB")
-        return file.read()
+    """Bytes of a returned file; Unreadable if it is too large to be one."""
+    try:
+        if path.stat().st_size > LARGEST:
+            raise Unreadable(f"not read: larger than {LARGEST // 2**20} MB")
+        return path.read_bytes()
+    except OSError as error:
+        raise Unreadable(error.strerror) from None
 
 
 class Cell(NamedTuple):
@@ -165,18 +163,25 @@ class Cell(NamedTuple):
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """The notebook as a dict with a dict metadata."""
+    """The notebook as a dict."""
+    content = _content(path)
     try:
-        document = json.loads(_content(path))
-    except OSError as error:
-        raise Unreadable(error.strerror or str(error)) from None
+        document = json.loads(content)
     except (ValueError, RecursionError):
         raise Unreadable(
             "not a notebook: the file is not JSON; was it cut off, or saved as something else?"
         ) from None
-    if not isinstance(document, dict) or not isinstance(document.get("metadata", {}), dict):
+    if not isinstance(document, dict):
         raise Unreadable("not a notebook: JSON of something else")
     return document
+
+
+def claim_of(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What a notebook says of itself: set, variant and student."""
+    match document:
+        case {"metadata": {"kfcourse": dict(claim)}}:
+            return claim
+    return {}
 
 
 def cells_of(document: Mapping[str, Any]) -> list[Cell]:
@@ -190,11 +195,11 @@ def cells_of(document: Mapping[str, Any]) -> list[Cell]:
     for number, cell in enumerate(cells, 1):
         if not isinstance(cell, dict):
             continue
-        source, metadata = cell.get("source", ""), cell.get("metadata")
+        source, answer = cell.get("source", ""), ""
         source = "".join(map(str, source)) if isinstance(source, list) else str(source)
-        mark = metadata.get("kfcourse") if isinstance(metadata, dict) else None
-        answer = mark.get("answer") if isinstance(mark, dict) else None
-        answer = answer if isinstance(answer, str) else ""
+        match cell:
+            case {"metadata": {"kfcourse": {"answer": str(mark)}}}:
+                answer = mark
         if source.strip():
             read.append(
                 Cell(
@@ -204,16 +209,16 @@ def cells_of(document: Mapping[str, Any]) -> list[Cell]:
     return read
 
 
-def claimed(claim: Any, variants_file: Path | None, given: str = "") -> tuple[Exercise, list[str]]:
+def claimed(
+    claim: Mapping[str, Any], variants_file: Path | None, given: str = ""
+) -> tuple[Exercise, list[str]]:
     """The set that a notebook claims, for the variant that was given, and whether that is another
     one.
 
     Without a course list the notebook has only a name of a variant to give; a table in it counts
     for nothing.
     """
-    letter, name = (
-        str(claim.get(key)) if isinstance(claim, dict) else "" for key in ("set", "variant")
-    )
+    letter, name = str(claim.get("set")), str(claim.get("variant"))
     if letter not in sets():
         raise Unreadable(
             f"claims set {letter!r}, variant {name!r}; the sets are {', '.join(sets())}"

@@ -51,18 +51,18 @@ class Other:
     """What arrives of a value that is none of those above: the name of its type."""
 
 
-Functions = Callable[[Any], int]  # registers a function that the other side may call: its number
 Proxies = Callable[[int], Any]  # the function of a number, as this side calls it
 
 
-def encode(value: Any, functions: Functions | None = None) -> Any:
+def encode(value: Any, functions: list[Callable] | None = None) -> Any:
     """The value as what `json.dumps` takes.
 
     Parameters
     ----------
     value
-    functions : callable, optional
-        Gives a function its number; without it a function is a value of another type.
+    functions : list, optional
+        Takes functions that the other side may call by their numbers in it; without it a function
+        is a value of another type.
     """
     if value is None or type(value) in (bool, int, float, str):
         return value
@@ -78,7 +78,8 @@ def encode(value: Any, functions: Functions | None = None) -> Any:
     if isinstance(value, sp.Expr):
         return ["formula", _text(value)]
     if callable(value) and functions is not None:
-        return ["function", functions(value)]
+        functions.append(value)
+        return ["function", len(functions) - 1]
     # of NumPy, pandas and the like
     if isinstance(value, complex) or (hasattr(value, "__array__") and not isinstance(value, type)):
         return _array(value, functions)
@@ -91,7 +92,7 @@ def _text(formula: sp.Expr) -> str:
     return sp.srepr(formula, order="none")  # to put long sums in order takes minutes
 
 
-def _array(value: Any, functions: Functions | None) -> Any:
+def _array(value: Any, functions: list[Callable] | None) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "O":
         return encode(array.tolist(), functions)
@@ -114,34 +115,31 @@ def decode(data: Any, proxies: Proxies | None = None) -> Any:
         Number of a function of the other side to what is called here in its place.
     """
     try:
-        return _decoded(data, proxies)
+        match data:
+            case None | bool() | int() | float() | str():
+                return data
+            case ["list" | "tuple" as kind, list(parts)]:
+                values = [decode(part, proxies) for part in parts]
+                return values if kind == "list" else tuple(values)
+            case ["array" | "scalar" as kind, str(text)]:
+                content = io.BytesIO(base64.b64decode(text, validate=True))
+                array = np.load(content, allow_pickle=False)
+                if array.dtype.kind not in "biufc":
+                    raise ProtocolError(f"an array of {array.dtype}")
+                array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
+                return array[()] if kind == "scalar" else array
+            case ["formula", str(text)]:
+                return formula(text)
+            case ["formulas", int(rows), int(columns), list(texts)]:
+                return sp.ImmutableMatrix(rows, columns, list(map(formula, texts)))
+            case ["function", int(number)] if proxies is not None:
+                return proxies(number)
+            case ["other", str(name)]:
+                return type(re.sub(r"[^\w .()]", "", name)[:60] or "object", (Other,), {})()
     except ProtocolError:
         raise
     except Exception as error:  # whatever nonsense leads to
         raise ProtocolError(f"{type(error).__name__}: {error}"[:200]) from None
-
-
-def _decoded(data: Any, proxies: Proxies | None) -> Any:
-    if data is None or isinstance(data, bool | int | float | str):
-        return data
-    match data:
-        case ["list" | "tuple" as kind, list(parts)]:
-            values = [_decoded(part, proxies) for part in parts]
-            return values if kind == "list" else tuple(values)
-        case ["array" | "scalar" as kind, str(text)]:
-            array = np.load(io.BytesIO(base64.b64decode(text, validate=True)), allow_pickle=False)
-            if array.dtype.kind not in "biufc":
-                raise ProtocolError(f"an array of {array.dtype}")
-            array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
-            return array[()] if kind == "scalar" else array
-        case ["formula", str(text)]:
-            return formula(text)
-        case ["formulas", int(rows), int(columns), list(texts)]:
-            return sp.ImmutableMatrix(rows, columns, [formula(text) for text in texts])
-        case ["function", int(number)] if proxies is not None:
-            return proxies(number)
-        case ["other", str(name)]:
-            return type(re.sub(r"[^\w .()]", "", name)[:60] or "object", (Other,), {})()
     raise ProtocolError(f"a value of the kind {str(data)[:40]!r}")
 
 

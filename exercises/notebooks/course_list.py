@@ -6,11 +6,12 @@ import csv
 import hashlib
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from kfcourse.exercises.notebooks.texts import clean, plain, safe, write_csv
+from kfcourse.files import read_text
 
 
 class Student(NamedTuple):
@@ -78,7 +79,7 @@ def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
     ValueError
         As `assign`; or a variant is missing in some lines only.
     """
-    rows = list(_distinct(path))
+    rows = _distinct(path)
     if not any(row.variant for _, row in rows):
         return assign(path, variants)
     for line, row in rows:
@@ -87,43 +88,23 @@ def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
     return [row for _, row in rows]
 
 
-def _distinct(path: Path) -> Iterator[tuple[int, Student]]:
-    """The lines of a course list with their numbers; ValueError if two students would share a
+def _distinct(path: Path) -> list[tuple[int, Student]]:
+    """The students of a CSV file with the columns name and group, an assignment's with variant and
+    sets too, and their lines; ValueError if a line cannot be right, two students would share a
     folder, or there is none."""
-    seen: dict[str, tuple[int, Student]] = {}
-    for line, row in read_course_list(path):
-        folder = row.folder.as_posix()
-        number, other = seen.setdefault(folder.casefold(), (line, row))
-        if other is row:
-            yield line, row
-        else:
-            raise ValueError(
-                f"{path}, line {line}: the folder of {row.name}, {row.group} would be {folder}, as "
-                f"that of {other.name}, {other.group} in line {number} (some systems take large "
-                f"and small letters for the same); change one name"
-            )
-    if not seen:
-        raise ValueError(f"{path} names no student")
-
-
-def read_course_list(path: Path) -> Iterator[tuple[int, Student]]:
-    """Every student in a CSV file with the columns name and group; an assignment has variant and
-    sets, too."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
+        text = read_text(path)
+    except ValueError as error:
         raise ValueError(
-            f"the course list {path}, a CSV file with the columns name and group, cannot be read: "
-            f"{error.strerror}"
+            f"the course list {error}; it is a CSV UTF-8 file with the columns name and group"
         ) from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
     first = text.partition("\n")[0]
     delimiter = max(",;\t", key=first.count)
     reader = csv.DictReader(
         io.StringIO(text), delimiter=delimiter, skipinitialspace=True, strict=True
     )
-    line = 1
+    rows: dict[str, tuple[int, Student]] = {}
+    line = 0
     try:
         columns = [(column or "").strip().lower() for column in reader.fieldnames or []]
         if not {"name", "group"} <= set(columns):
@@ -131,10 +112,20 @@ def read_course_list(path: Path) -> Iterator[tuple[int, Student]]:
                 f"{path}: the first line must name the columns name and group, got "
                 f"{', '.join(columns) or 'nothing'}"
             )
-        reader.fieldnames = columns
+        reader.fieldnames, line = columns, 1
         for values in reader:
-            line, before = reader.line_num, line
-            yield from _row(path, before + 1, values)
+            number, line = line + 1, reader.line_num
+            where = f"{path}, line {number}"
+            if (row := _student(where, values)) is None:
+                continue
+            folder = row.folder.as_posix()
+            first_line, other = rows.setdefault(folder.casefold(), (number, row))
+            if other is not row:
+                raise ValueError(
+                    f"{where}: the folder of {row.name}, {row.group} would be {folder}, as that of "
+                    f"{other.name}, {other.group} in line {first_line} (some systems take large "
+                    f"and small letters for the same); change one name"
+                )
     except csv.Error as error:
         quoted = (
             "; is a quote opened and not closed?"
@@ -142,22 +133,24 @@ def read_course_list(path: Path) -> Iterator[tuple[int, Student]]:
             else ""
         )
         raise ValueError(f"{path}, line {line + 1}: {error}{quoted}") from None
+    if not rows:
+        raise ValueError(f"{path} names no student")
+    return list(rows.values())
 
 
-def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[tuple[int, Student]]:
-    """The row, or none of an empty line; ValueError if it cannot be right."""
-    where = f"{path}, line {line}"
+def _student(where: str, values: Mapping[str | None, Any]) -> Student | None:
+    """The student of a row, None if it is empty; ValueError if it cannot be right."""
     fields = {key: plain(clean(values.get(key) or "")) for key in Student._fields}
     if any(str(value).strip() for value in values.get(None) or []):
         raise ValueError(
             f"{where}: more values than columns; put a name that has a comma in it into quotes"
         )
     if not fields["name"] and not fields["group"]:
-        return
+        return None
     for key, of in (("name", "a student"), ("group", fields["name"])):
         if not re.search(r"\w", fields[key]):
             raise ValueError(
                 f"{where}: {of} without a {key}"
                 + (f" (got {fields[key]!r})" if fields[key] else "")
             )
-    yield line, Student(**fields)
+    return Student(**fields)

@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -47,18 +47,16 @@ class _Client(NotebookClient):
 
 
 class NotebookFailed(RuntimeError):
-    """A notebook stopped; the message names it and the cell."""
+    """A notebook stopped; the message names the cell."""
 
 
-def execute(notebook: NotebookNode, name: str) -> NotebookNode:
+def execute(notebook: NotebookNode) -> NotebookNode:
     """Run a notebook in a new kernel and an empty folder.
 
     Parameters
     ----------
     notebook : NotebookNode
         Not changed.
-    name : str
-        For messages.
 
     Raises
     ------
@@ -85,10 +83,10 @@ def execute(notebook: NotebookNode, name: str) -> NotebookNode:
                 why = f"{error.ename}: {error.evalue}"
             elif isinstance(error, CellTimeoutError):
                 why = f"still running after {SECONDS:g} s"
-            raise NotebookFailed(f"{name}, cell {started[-1]}: {why}") from None
+            raise NotebookFailed(f"cell {started[-1]}: {why}") from None
     if failure := first_error(result):
         cell, shown = failure
-        raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
+        raise NotebookFailed(f"cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
 
 
@@ -147,16 +145,18 @@ def html(executed: NotebookNode, title: str) -> str:
 
 def mathml(text: str) -> str:
     """TeX between dollars as MathML; code in backquotes stays."""
-    parts = re.split(r"(```.*?```|`[^`\n]*`)", text, flags=re.DOTALL)
-    return "".join(part if i % 2 else _formulas(part) for i, part in enumerate(parts))
 
+    def written_out(match: re.Match) -> str:
+        code, block, inline = match.groups()
+        tex = (block or inline or "").replace(r"\displaystyle", "").strip()
+        return code or formula(tex, "block" if block else "inline")
 
-def _formulas(text: str) -> str:
-    def display(mode: str) -> Callable[[re.Match], str]:
-        return lambda match: formula(match.group(1).replace(r"\displaystyle", "").strip(), mode)
-
-    text = re.sub(r"\$\$(.+?)\$\$", display("block"), text, flags=re.DOTALL)
-    return re.sub(r"(?<![\\$])\$([^$]+?)\$", display("inline"), text)
+    return re.sub(
+        r"(```.*?```|`[^`\n]*`)|\$\$(.+?)\$\$|(?<![\\$])\$([^$]+?)\$",
+        written_out,
+        text,
+        flags=re.DOTALL,
+    )
 
 
 def pdf(page: Path, target: Path) -> None:

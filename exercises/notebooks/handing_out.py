@@ -4,9 +4,8 @@ done."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 from tqdm import tqdm
@@ -46,17 +45,26 @@ def hand_out(
         variant.plain("the exercises")  # told once, not for each set
     if variants_file and (everything or not names):
         _say_left_out(variants_file, bool(variants))
-    options: dict[str, Any] = {"with_pdf": with_pdf, "masters": masters and masters.absolute()}
-    options["variants_file"] = variants_file and variants_file.absolute()
+    places = [(name, out / safe(name), "") for name in variants]
     if students:
-        work = _for_students(kind, students, [*variants], wanted, out, options)
-    else:
-        folder = out.absolute()
-        work = [
-            Job(letter, name, folder / safe(name), kind, **options)
-            for name in variants
-            for letter in wanted
+        given = assign(students, [*variants])
+        places = [
+            (student.variant, out / student.folder, f"{student.name}, {student.group}")
+            for student in given
         ]
+        click.echo("group       variant   name")
+        for student in given:
+            click.echo(f"{student.group:<11} {clean(student.variant):<9} {student.name}")
+        if kind == "exercises":
+            table = out / ASSIGNMENT
+            out.mkdir(parents=True, exist_ok=True)
+            save_assignment((student._replace(sets=" ".join(wanted)) for student in given), table)
+            click.echo(f"\nWho has which variant: {table}, for `kfcourse grade --students`")
+    work = [
+        Job(letter, variant, folder, kind, variants_file, masters, with_pdf, whom)
+        for variant, folder, whom in places
+        for letter in wanted
+    ]
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     failed = _show(run_all(work, make, workers, kind), work)
@@ -98,40 +106,6 @@ def _letters(given: str | None) -> list[str]:
     return letters
 
 
-def _for_students(
-    kind: str,
-    students: Path,
-    variants: Sequence[str],
-    letters: Sequence[str],
-    out: Path,
-    options: Mapping[str, Any],
-) -> list[Job]:
-    """A folder for each student, out/group/name, with their variant's notebooks; the assignment is
-    printed."""
-    given = assign(students, variants)
-    click.echo("group       variant   name")
-    for student in given:
-        click.echo(f"{student.group:<11} {clean(student.variant):<9} {student.name}")
-    if kind == "exercises":
-        out.mkdir(parents=True, exist_ok=True)
-        save_assignment(
-            [student._replace(sets=" ".join(letters)) for student in given], out / ASSIGNMENT
-        )
-        click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
-    return [
-        Job(
-            letter,
-            student.variant,
-            out.absolute() / student.folder,
-            kind,
-            student=f"{student.name}, {student.group}",
-            **options,
-        )
-        for student in given
-        for letter in letters
-    ]
-
-
 def _separate(work: Sequence[Job]) -> None:
     """ValueError if two jobs would write the same file; some file systems take large and small
     letters for the same."""
@@ -161,10 +135,5 @@ def _show(outcomes: Iterable[Outcome], work: Sequence[Job]) -> list[Outcome]:
                 count[folder][status] for status in ("written", "up to date", "failed")
             )
             with tqdm.external_write_mode():  # the progress bar stands aside
-                click.echo(f"{_relative(folder):<28} {written:>7} {old:>11} {wrong:>7}")
+                click.echo(f"{folder!s:<28} {written:>7} {old:>11} {wrong:>7}")
     return failed
-
-
-def _relative(folder: Path) -> str:
-    """A folder as a user would name it: relative to where the command runs, if it is there."""
-    return str(folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder)

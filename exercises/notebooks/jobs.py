@@ -46,8 +46,7 @@ class Job:
     ----------
     letter, variant : str
     folder : Path
-        Where the files go; absolute, as the others: a worker process may have another working
-        directory.
+        Where the files go.
     kind : {"exercises", "nbgrader", "solutions"}
     variants_file : Path or None
     masters : Path or None
@@ -101,7 +100,7 @@ def make(job: Job) -> Outcome:
             ]
         if _up_to_date(job.target, notebook) and all(path.exists() for path in wanted):
             return Outcome(job, "up to date")
-        executed = execute(solution(notebook), job.name)
+        executed = execute(solution(notebook))
         wrong = [result for result in results(executed) if result["status"] != PASSED]
         if wrong:
             return Outcome(
@@ -111,7 +110,7 @@ def make(job: Job) -> Outcome:
             )
         _write(job, notebook, executed)
     except (NotebookFailed, ValueError, OSError) as error:
-        return Outcome(job, "failed", str(error).removeprefix(f"{job.name}, "))
+        return Outcome(job, "failed", str(error))
     except Exception as error:  # of a library: one notebook must not stop the others
         return Outcome(job, "failed", f"{type(error).__name__}: {error}")
     return Outcome(job, "written")

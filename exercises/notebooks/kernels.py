@@ -29,14 +29,15 @@ LAUNCHER = "ipykernel_launcher"
 # The last: a fork is told how its parent starts processes, and a worker of joblib does it in
 # joblib's way.
 IMPORTED = [
-    *(
-        "ipykernel.kernelapp",
-        "matplotlib.backends.backend_svg",
-        "scipy.special",
-        "scipy.linalg",
-        "scipy.stats",
-    ),
-    *("sympy.physics.units", "kfcourse.pages", "kfcourse.exercises.sets", "joblib"),
+    "ipykernel.kernelapp",
+    "matplotlib.backends.backend_svg",
+    "scipy.special",
+    "scipy.linalg",
+    "scipy.stats",
+    "sympy.physics.units",
+    "kfcourse.pages",
+    "kfcourse.exercises.sets",
+    "joblib",
 ]
 
 
@@ -82,7 +83,12 @@ class ForkedProvisioner(LocalProvisioner):
             return await super().launch_kernel(cmd, **kwargs)
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(IMPORTED)
-        _start_server()
+        # deaf to Ctrl-C, which is for the command: it would print where its imports stopped
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         arguments = cmd[cmd.index(LAUNCHER) + 1 :]
         process = context.Process(
             target=serve, args=(arguments, dict(kwargs["env"]), kwargs.get("cwd"))
@@ -92,20 +98,6 @@ class ForkedProvisioner(LocalProvisioner):
         return self.connection_info
 
 
-def _start_server() -> None:
-    """The fork server, deaf to Ctrl-C, which is for the command: it would print where its imports
-    were interrupted."""
-    if threading.current_thread() is not threading.main_thread():
-        forkserver.ensure_running()
-        return
-    # what a process ignores, the one that it starts ignores too
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        forkserver.ensure_running()
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 class Fork:
     """A forked process with what Jupyter asks of a `subprocess.Popen`."""
 
@@ -113,6 +105,7 @@ class Fork:
 
     def __init__(self, process: ForkServerProcess):
         self._process = process
+        self.kill, self.terminate = process.kill, process.terminate
 
     def poll(self) -> int | None:
         return self._process.exitcode
@@ -125,17 +118,12 @@ class Fork:
         if self._process.pid is not None and self._process.is_alive():
             os.kill(self._process.pid, number)
 
-    def kill(self) -> None:
-        self.send_signal(signal.SIGKILL)
-
-    def terminate(self) -> None:
-        self.send_signal(signal.SIGTERM)
-
 
 def serve(arguments: list[str], environment: dict[str, str], folder: str | None) -> None:
     """In the fork: be a kernel, with the environment and in the folder that it shall have."""
     from ipykernel.kernelapp import IPKernelApp
 
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # as for any kernel
     threading.Thread(target=_follow, daemon=True).start()
     # what has been imported stays: not to be looked through, nor copied for that, at every
     # collection

@@ -27,6 +27,7 @@ import base64
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ import nbformat
 import sympy as sp
 from nbformat import NotebookNode
 
-from kfcourse.exercises.checks import Exercise, Question, sets
+from kfcourse.exercises.checks import Exercise, sets
 from kfcourse.exercises.notebooks.written_code import Solutions
 from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.symbolic.model import Model
@@ -218,6 +219,9 @@ def statement(notebook: NotebookNode, pictures: Mapping[str, tuple[str, int]]) -
 def context(exercise: Exercise) -> dict[str, Any]:
     """What a master's template may use."""
     model = exercise.model
+    blocks = [model.latex(values=False)]
+    if model.timed and (lines := model.known.latex()):  # the time, first values of the inputs
+        blocks.append("\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}")
     return {
         "exercise": exercise,
         "variant": exercise.variant.name,
@@ -226,25 +230,16 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "model": model,
         "scalar": model.n == 1 and model.p == 1,
         "latex": sp.latex,
-        "equations": "\n\n".join(
-            f"$$\n{block}\n$$" for block in (model.latex(values=False), *known_values(model))
-        ),
+        "equations": "\n\n".join(f"$$\n{block}\n$$" for block in blocks),
         "timed": model.timed,
         "known": known(model),
         "k": ", k" if model.timed else "",  # the last argument of functions that take the step
         "symbols": parameter_symbols(exercise),
         "values": {name: float(value) for name, value in model.parameters.items()},
         "solution": Solutions(exercise),
-        "heading": lambda name, russian="": heading(exercise.questions[name], russian),
-        "check": lambda name: check_cell(exercise.questions[name]),
+        "heading": partial(heading, exercise),
+        "check": partial(check_cell, exercise),
     }
-
-
-def known_values(model: Model) -> list[str]:
-    """An `aligned` block with the time and the first values of the inputs; none if the equations
-    have neither."""
-    lines = model.known.latex() if model.timed else []
-    return ["\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"] if lines else []
 
 
 def known(model: Model) -> str:
@@ -255,17 +250,18 @@ def known(model: Model) -> str:
     return f"Your equations depend on the step: {'; '.join(parts)}." if parts else ""
 
 
-def heading(question: Question, russian: str = "") -> str:
+def heading(exercise: Exercise, name: str, russian: str = "") -> str:
     """Number, level and title of a question."""
+    question = exercise.questions[name]
     term = f" ({russian})" if russian else ""
-    return f"## Question {question.name[1:]} ({question.level}): {question.title}{term}"
+    return f"## Question {name[1:]} ({question.level}): {question.title}{term}"
 
 
-def check_cell(question: Question) -> str:
+def check_cell(exercise: Exercise, name: str) -> str:
     """The cell in which a student checks an answer."""
     return (
-        f'```{{code-cell}} python\n:tags: [check]\ntask.check("{question.name}", '
-        f"{question.function})\n```"
+        f'```{{code-cell}} python\n:tags: [check]\ntask.check("{name}", '
+        f"{exercise.questions[name].function})\n```"
     )
 
 

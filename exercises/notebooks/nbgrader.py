@@ -32,24 +32,24 @@ def source_notebook(notebook: NotebookNode) -> NotebookNode:
         elif asked:
             question = asked[2]
             cell.source = f"result = {cell.source.strip()}\nassert result.passed, result"
-            cell.metadata["nbgrader"] = _marked(question, grade=True, locked=True) | {
+            cell.metadata["nbgrader"] = _marked(question, True) | {
                 "points": WEIGHTS[levels[question]]
             }
         elif BEGIN in cell.source and not without_solution(cell.source, code=True):
             cell.source = ""  # an answer in words
         elif BEGIN in cell.source:
-            cell.metadata["nbgrader"] = _marked(f"{cell.id}-answer", solution=True)
+            cell.metadata["nbgrader"] = _marked(f"{cell.id}-answer", False)
     result.cells = [cell for cell in result.cells if cell.source.strip()]
     return result
 
 
-def _marked(name: str, grade: bool = False, solution: bool = False, locked: bool = False) -> dict:
-    """nbgrader's metadata of a cell."""
+def _marked(name: str, test: bool) -> dict:
+    """nbgrader's metadata of a cell: a locked test, or a solution."""
     return {
         "grade_id": name,
         "schema_version": SCHEMA,
-        "grade": grade,
-        "solution": solution,
-        "locked": locked,
+        "grade": test,
+        "solution": not test,
+        "locked": test,
         "task": False,
     }

@@ -137,7 +137,6 @@ class _Printer(StrPrinter):
         return super()._print_Pow(expr, rational)
 
     def _print_Pi(self, expr: sp.Expr) -> str:
-        return "sp.pi"
+        return f"sp.{expr}"
 
-    def _print_Exp1(self, expr: sp.Expr) -> str:
-        return "sp.E"
+    _print_Exp1 = _print_Pi

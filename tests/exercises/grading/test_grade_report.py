@@ -63,7 +63,7 @@ def graded(name, letter="b", variant="53", passed=(), student="", work="w", look
     ],
 )
 def test_whose_notebook(name, student, course, expected):
-    assert owner(graded(name, student=student), course) == expected
+    assert owner(name, student, course) == expected
 
 
 def test_what_to_look_at():

@@ -19,7 +19,7 @@ from kfcourse.exercises.grading.assembly import Step
 from kfcourse.exercises.grading.marking import Marking, Setting
 from kfcourse.exercises.grading.running import KILLED, Kernel
 from kfcourse.exercises.grading.sandbox import Sandbox
-from kfcourse.exercises.grading.staging import answers, stage
+from kfcourse.exercises.grading.staging import packages, stage
 from kfcourse.exercises.grading.submissions import returned
 
 TASK = exercise("b", "53")
@@ -56,7 +56,7 @@ def staged(tmp_path_factory):
 @pytest.fixture(scope="module")
 def box(tmp_path_factory, staged):
     """Bubblewrap's sandbox, or none where it does not work."""
-    box = Sandbox("bwrap", staged, tuple(map(str, answers())))
+    box = Sandbox("bwrap", staged, tuple(map(str, packages())))
     return replace(box, kind="none") if sandbox.problem(box) else box
 
 
@@ -168,7 +168,7 @@ def test_a_sandbox_holds(box, tmp_path, monkeypatch):
     # the teacher's path may be a home with everything in it
     (outside / "keys_of_the_exam.py").write_text("answer = 42", encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(outside))
-    hidden = str(answers()[0])
+    hidden = str(packages()[1])
     own = {
         "keys": f"import os\nassert not os.path.exists({hidden!r}) or not os.listdir({hidden!r})",
         "path": "import os\nassert not os.environ['PYTHONPATH'].count(os.pathsep)",

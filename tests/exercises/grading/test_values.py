@@ -73,7 +73,7 @@ def test_anything_else_is_its_type_only(value):
 
 def test_functions_are_called_on_the_other_side():
     functions = []
-    data = encode([len], lambda function: functions.append(function) or 0)
+    data = encode([len], functions)
     assert functions == [len]
     assert decode(data, lambda number: functions[number]) == [len]
     with pytest.raises(ProtocolError):
@@ -123,8 +123,8 @@ def test_every_question_can_be_asked_with_numbers_of_the_graders_own(letter):
         for task in (own, hidden):
             data = []
             for values in question.arguments(task):
-                functions = [value for value in values if callable(value)]
-                data.append(json.dumps(encode(tuple(values), functions.index)))
+                functions = []
+                data.append(json.dumps(encode(tuple(values), functions)))
                 received = decode(json.loads(data[-1]), functions.__getitem__)
                 assert [type(a) for a in received] == [type(b) for b in values], question.name
             texts.append(" ".join(data))
