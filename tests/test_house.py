@@ -198,7 +198,7 @@ ROOMS = {
     "exercises/*.py": 820,
     "exercises/checks": 17_280,
     "exercises/derivations": 14_500,
-    "exercises/grading": 14_820,
+    "exercises/grading": 14_900,
     "exercises/notebooks": 7_410,
     "exercises/sets": 42_040,
     "kfcourse/*.py": 6_160,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import queue
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 from typing import IO, Any
 
 from kfcourse.exercises.grading.values import LARGEST, ProtocolError
@@ -60,15 +61,27 @@ class Channel:
 
 class PatientChannel(Channel):
     """A channel that waits no longer than it is told, on every system: a thread of its own
-    receives."""
+    receives.  The thread is a daemon: what has escaped may hold the pipe open for ever."""
 
     def __init__(self, source: IO[bytes], sink: IO[bytes]):
         super().__init__(source, sink)
-        self._receiver = ThreadPoolExecutor(1)
-        self._next = self._receiver.submit(self.receive)  # a flood waits in the pipe
+        # a flood waits in the pipe
+        self._queue: queue.Queue[dict[str, Any] | Exception] = queue.Queue(maxsize=100)
+        threading.Thread(target=self._forward, daemon=True).start()
+
+    def _forward(self) -> None:
+        try:
+            while True:
+                self._queue.put(self.receive())
+        except Exception as error:
+            self._queue.put(error)
 
     def wait(self, until: float) -> dict[str, Any]:
         """The next message; TimeoutError if none is there at that time of `time.monotonic`."""
-        message = self._next.result(max(until - time.monotonic(), 0.0))
-        self._next = self._receiver.submit(self.receive)
+        try:
+            message = self._queue.get(timeout=max(until - time.monotonic(), 0.0))
+        except queue.Empty:
+            raise TimeoutError from None
+        if isinstance(message, Exception):
+            raise message
         return message

@@ -135,8 +135,10 @@ def _unread(path: Path, inside: PurePath) -> str:
 
 
 def _content(path: Path) -> bytes:
-    """Bytes of a returned file; Unreadable if it is too large to be one."""
+    """Bytes of a returned file; Unreadable if it has become a link, or is too large to be one."""
     try:
+        if path.is_symlink():
+            raise Unreadable("not read: it has become a link")
         if path.stat().st_size > LARGEST:
             raise Unreadable(f"not read: larger than {LARGEST // 2**20} MB")
         return path.read_bytes()

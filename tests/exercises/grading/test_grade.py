@@ -34,7 +34,13 @@ from kfcourse.exercises.grading.assembly import assembled
 from kfcourse.exercises.grading.marking import code_of
 from kfcourse.exercises.grading.results import Grade, read_lines
 from kfcourse.exercises.grading.sandbox import Sandbox
-from kfcourse.exercises.grading.submissions import Cell, Unreadable, cells_of, claimed
+from kfcourse.exercises.grading.submissions import (
+    Cell,
+    Unreadable,
+    cells_of,
+    claimed,
+    read_document,
+)
 from kfcourse.exercises.notebooks.course_list import Student
 from kfcourse.exercises.notebooks.master import read, render, solution, student
 
@@ -610,6 +616,12 @@ def test_the_same_answers_in_another_order_are_the_same_work():
     longest = Cell(1, "", "", f"def one(x):\n    return {' + '.join(['x'] * 2000)}")
     # deeper than Python's stack, if its parts were called one in the other
     assert code_of([longest], names)
+
+
+def test_what_has_become_a_link_is_not_read(tmp_path):
+    (tmp_path / "a.ipynb").symlink_to(tmp_path)
+    with pytest.raises(Unreadable, match="become a link"):
+        read_document(tmp_path / "a.ipynb")
 
 
 @pytest.mark.parametrize("document", [{}, {"cells": {}}, {"worksheets": []}])
