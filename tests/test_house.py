@@ -198,8 +198,8 @@ ROOMS = {
     "benchmarks": 4_950,
     "book": 29_260,
     "exercises/*.py": 830,
-    "exercises/checks": 17_280,
-    "exercises/derivations": 14_500,
+    "exercises/checks": 16_950,
+    "exercises/derivations": 13_760,
     "exercises/grading": 16_090,
     "exercises/notebooks": 7_750,
     "exercises/sets": 42_040,
@@ -213,7 +213,7 @@ ROOMS = {
     "kfcourse/records": 5_460,
     "kfcourse/scenarios": 9_960,
     "kfcourse/symbolic": 18_520,
-    "tests": 170_410,
+    "tests": 170_390,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

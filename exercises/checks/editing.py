@@ -8,6 +8,7 @@ catalogue are changes of one node of its syntax.
 from __future__ import annotations
 
 import ast
+import copy
 import inspect
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
@@ -181,26 +182,17 @@ def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:
     sources = {name: _source(function) for name, function in pieces(key).items()}
     for letters in (False, True):  # of which there are many
         for name, source in sources.items():
-            nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
+            tree = ast.parse("" if "while " in source else source)
+            nodes = list(ast.walk(tree))
             names = sorted({node.arg for node in nodes if isinstance(node, ast.arg)})
             fixed = [node.iter for node in nodes if isinstance(node, ast.For | ast.comprehension)]
-            left = {id(node) for loop in fixed for node in ast.walk(loop)}
-            for place, node in enumerate(nodes):
-                if isinstance(node, ast.Name) is letters and id(node) not in left:
-                    for number, (kind, _) in enumerate(changes(node, names)):
-                        text = _changed(source, place, number, names)
-                        yield kind, _built(key, {**sources, name: text})
+            left = [node for loop in fixed for node in ast.walk(loop)]
+            for node in nodes:
+                if isinstance(node, ast.Name) is letters and node not in left:
+                    for kind, new in changes(node, names):
+                        yield kind, _built(key, {**sources, name: replaced(tree, node, new)})
 
 
-def _changed(source: str, place: int, number: int, names: Sequence[str]) -> str:
-    """The source with one of the changes of one node."""
-    tree = ast.parse(source)
-    old = list(ast.walk(tree))[place]
-    _, new = list(changes(old, names))[number]
-    for parent in ast.walk(tree):
-        for field, value in ast.iter_fields(parent):
-            if value is old:
-                setattr(parent, field, new)
-            elif isinstance(value, list):
-                value[:] = [new if entry is old else entry for entry in value]
-    return ast.unparse(ast.fix_missing_locations(tree))
+def replaced(tree: ast.AST, old: ast.AST, new: ast.AST) -> str:
+    """The source of a tree with another node in the place of one."""
+    return ast.unparse(copy.deepcopy(tree, {id(old): new}))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.exercises.checks.equality import near
 from kfcourse.exercises.checks.reference import Posed
 
 NUMBERS = 9  # that are shown of one array
@@ -58,11 +59,8 @@ def _of_array(
     axes, tolerance = posed.question.axes, posed.question.tolerance
     place: tuple[int, ...] = ()
     if axes and answered.ndim >= len(axes):
-        scale = np.max(np.abs(expected[np.isfinite(expected)]), initial=0.0)
-        near = np.isclose(
-            answered, expected, rtol=tolerance, atol=tolerance * scale, equal_nan=True
-        )
-        place = tuple(np.argwhere(~near)[0, : len(axes)].tolist())
+        wrong = np.argwhere(~near(answered, expected, tolerance))
+        place = tuple(wrong[0, : len(axes)].tolist())
     sizes = expected.shape[: len(place)]
     inputs = []
     for name, value in zip(posed.names, posed.arguments[call], strict=True):

@@ -286,10 +286,10 @@ def factor_or_term(case: Case) -> Said | None:
         return None
     if all(b.size > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
         return "wrong-term", "It is right but for a term that is one number for the whole result."
-    a, b = case.numbers
+    a, b = (np.concatenate([*map(np.ravel, side)]) for side in (case.answered, case.expected))
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)
-        if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
+        if abs(ratio) > 1e-6 and equal(a, ratio * b, 1e-9, {}):
             return "wrong-factor", "It is right but for a factor that is the same everywhere."
     return None
 

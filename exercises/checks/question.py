@@ -113,6 +113,10 @@ class Question:
         """The right answer for an exercise."""
         return answer_for(exercise, self.key)
 
+    def result(self, status: str, message: str, **more: Any) -> Result:
+        """What a check says of an answer to it."""
+        return Result(self.name, self.title, status, message, **more)
+
 
 @dataclass
 class Attempts:

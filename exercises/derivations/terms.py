@@ -111,11 +111,7 @@ def replaced(node: Node, names: dict[str, Node]) -> Node:
     """The tree with other nodes in the place of letters."""
     if node.kind == LETTER:
         return names.get(node.data, node)
-    return (
-        replace(node, parts=tuple(replaced(part, names) for part in node.parts))
-        if node.parts
-        else node
-    )
+    return replace(node, parts=tuple(replaced(part, names) for part in node.parts))
 
 
 def written(node: Node) -> str:

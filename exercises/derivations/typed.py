@@ -35,7 +35,7 @@ MEANS = ("M", "D", "Cov")
 DEEPEST = 60  # brackets and functions, one in the other
 LONGEST = 600  # numbers, letters and operations of a line
 
-_OTHERWISE = re.compile(r"\^|\blambda\b")  # no formula of Python's as it stands
+_OTHERWISE = re.compile(r"(\^|\blambda\b)")  # no formula of Python's as it stands
 _IN_PYTHON = {"^": "**", "lambda": "lambda_"}
 
 
@@ -53,16 +53,13 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
     FormulaError
         With the problem, the text and a pointer to the column.
     """
-    pieces, columns, end = [], [], 0
-    for match in _OTHERWISE.finditer(text):
-        new = _IN_PYTHON[match[0]]
-        pieces += [text[end : match.start()], new]
-        columns += [
-            *range(end, match.start()),
-            *(min(match.start() + i, match.end() - 1) for i in range(len(new))),
-        ]
-        end = match.end()
-    python, columns = "".join([*pieces, text[end:]]), [*columns, *range(end, len(text) + 1)]
+    python, columns, end = "", list[int](), 0
+    for piece in _OTHERWISE.split(text):
+        new = _IN_PYTHON.get(piece, piece)
+        python += new
+        columns += [end + min(i, len(piece) - 1) for i in range(len(new))]
+        end += len(piece)
+    columns.append(end)
     try:
         formula, tree, offset = syntax(python)
         return _Lines(formula, offset, name, columns).read(tree)

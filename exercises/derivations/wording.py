@@ -121,7 +121,7 @@ def _role(setting: Setting, name: str) -> str:
     law = setting.law
     if name in law.means:
         return "a mean"
-    if name in setting.variances:
+    if name in [row[i] for i, row in enumerate(law.cov)]:
         return "a variance"
     if name in law.letters:
         return "a covariance"
