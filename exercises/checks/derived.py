@@ -19,7 +19,7 @@ from kfcourse.exercises.checks.equality import Unusable
 from kfcourse.exercises.checks.question import PASSED, WRONG, Question, Result
 from kfcourse.exercises.derivations import DerivationError, Report, Verdict, check_text
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
-from kfcourse.exercises.derivations.terms import Node, has_mean, letter, letters, written
+from kfcourse.exercises.derivations.terms import Node, letter, letters, means_in, written
 from kfcourse.exercises.derivations.values import are_equal
 from kfcourse.exercises.derivations.verdicts import (
     AGAIN,
@@ -203,7 +203,7 @@ def _counted(report: Report, name: str) -> tuple[int, int]:
 
 def _open(posed: ToDerive, tree: Node | None) -> str:
     """What is still to be done after the last line; nothing if it is an end."""
-    if tree is None or has_mean(tree):
+    if tree is None or means_in(tree):
         return "In the last line a mean is still to be taken: go on until none is left."
     left = sorted(letters(tree) - posed.ends)
     if left:
@@ -223,7 +223,7 @@ def _is(posed: ToDerive, tree: Node | None) -> bool:
 
 def _not_shown(posed: ToDerive, chain: Derived) -> str:
     trees = [verdict.tree for verdict in chain.verdicts if verdict.tree is not None]
-    if posed.averages and not any(map(has_mean, trees)):
+    if posed.averages and not any(map(means_in, trees)):
         return "But a derivation is asked for: begin with a mean M[...], and take a step a line."
     if len({written(tree) for tree in trees}) < posed.fewest:
         return (

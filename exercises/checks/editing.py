@@ -72,14 +72,11 @@ def rebound(key: Answer, answers: dict[str, Answer]) -> Answer:
 
 def _source(function: FunctionType) -> str:
     """The source without the docstring, whose formulas look like the code."""
-    lines = inspect.getsource(function).splitlines(keepends=True)
-    (definition,) = ast.parse("".join(lines)).body
+    source = inspect.getsource(function)
+    (definition,) = ast.parse(source).body
     first = definition.body[0]  # type: ignore[attr-defined]
-    return (
-        "".join(lines[: first.lineno - 1] + lines[first.end_lineno :])
-        if inspect.getdoc(function)
-        else "".join(lines)
-    )
+    text = ast.get_source_segment(source, first) if function.__doc__ else ""
+    return source.replace(str(text), "", 1)
 
 
 def _built(

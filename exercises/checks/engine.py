@@ -171,6 +171,8 @@ def check(
         return question.result(NOT_CHECKED, says, trouble=_trouble(error))
     if result.status == WRONG:
         past.wrong[question.name] = answer
+    if result.passed:
+        past.given.pop(question.name, None)
     return result
 
 
@@ -200,19 +202,18 @@ class _Check:
             answered = call(self.answer, self.posed.arguments, self.posed.expected, self.seconds)
             if isinstance(self.question, Derivation):
                 return self._derived(self.question, answered)
+            with time_limit(self.seconds):
+                right = self.posed.agree(answered, self.posed.expected)
         except Missing:
             return self.question.result(MISSING, "not implemented yet")
         except Unusable as reason:
             return self.question.result(UNUSABLE, str(reason))
-        try:
-            with time_limit(self.seconds):
-                if self.posed.agree(answered, self.posed.expected):
-                    self.past.given.pop(self.question.name, None)
-                    return self.question.result(PASSED, "right", share=1.0)
         except OutOfTime:
             return self.question.result(
                 UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it"
             )
+        if right:
+            return self.question.result(PASSED, "right", share=1.0)
         try:
             # what other arguments and other keys lead to is no news
             with (
@@ -235,9 +236,7 @@ class _Check:
             raise Unusable(
                 f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
             ) from None
-        if judged.passed:
-            self.past.given.pop(question.name, None)
-        elif self._times(answered) and question.advice:
+        if not judged.passed and self._times(answered) and question.advice:
             return replace(judged, message=f"{judged.message} {question.advice}")
         return judged
 

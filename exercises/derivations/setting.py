@@ -58,11 +58,11 @@ class Law:
     def at(self, mean: str, cov: str) -> Law:
         """The same with other letters for mean and covariance; components are numbered."""
         n = len(self.states)
-        if n == 1:
-            return replace(self, means=(mean,), cov=((cov,),))
-        pairs = [[f"{cov}{min(i, j) + 1}{max(i, j) + 1}" for j in range(n)] for i in range(n)]
+        numbers = [f"{i + 1}" for i in range(n)] if n > 1 else [""]
         return replace(
-            self, means=tuple(f"{mean}{i + 1}" for i in range(n)), cov=tuple(map(tuple, pairs))
+            self,
+            means=tuple(mean + i for i in numbers),
+            cov=tuple(tuple(cov + min(i, j) + max(i, j) for j in numbers) for i in numbers),
         )
 
 

@@ -91,8 +91,8 @@ class _Lines(Reader):
                 node,
                 f"the line has more than {LONGEST} numbers, letters and signs; split the step up",
             )
-        start, end = node.col_offset, node.end_col_offset or node.col_offset + 1
-        place = self.columns[self.offset + start], self.columns[self.offset + end - 1] + 1
+        start, end = self.offset + node.col_offset, self.offset + (node.end_col_offset or 0)
+        place = self.columns[start], self.columns[end - 1] + 1
         tree = self._tree(node)
         tree = replace(
             tree,
@@ -105,8 +105,7 @@ class _Lines(Reader):
     def _tree(self, node: ast.expr) -> Node:
         match node:
             case ast.Constant():
-                value = self.number(node)
-                return Node(NUMBER, data=Fraction(int(value.p), int(value.q)))
+                return Node(NUMBER, data=Fraction(str(self.number(node))))
             case ast.Name():
                 return self._letter(node)
             case ast.UnaryOp(op=ast.USub()):
@@ -186,17 +185,12 @@ class _Lines(Reader):
             raise self.fail(
                 node.right, f"the exponent is larger than {MAX_EXPONENT}, or too fine a fraction"
             )
-        return power(self.read(node.left), Fraction(exponent.p, exponent.q))
+        return power(self.read(node.left), Fraction(str(exponent)))
 
     def _mean(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
-        wanted = 2 if name == "Cov" else 1
-        if len(arguments) != wanted:
-            raise self.fail(
-                node,
-                "Cov takes two expressions: Cov[a, b]"
-                if wanted == 2
-                else f"{name} takes one expression: {name}[a]",
-            )
+        if len(arguments) != (2 if name == "Cov" else 1):
+            how = "two expressions: Cov[a, b]" if name == "Cov" else f"one expression: {name}[a]"
+            raise self.fail(node, f"{name} takes {how}")
         first, second = (self.read(argument) for argument in (arguments[0], arguments[-1]))
         if name == "M":
             return Node(MEAN, (first,))

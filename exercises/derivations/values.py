@@ -25,7 +25,7 @@ from kfcourse.exercises.derivations.terms import (
     PRODUCT,
     SUM,
     Node,
-    walk,
+    means_in,
 )
 from kfcourse.laws import Array
 
@@ -62,12 +62,12 @@ def degrees(node: Node, setting: Setting) -> dict[str, float]:
         return degrees(meaning, setting) if meaning else {}
     parts = [degrees(part, setting) for part in node.parts]
     names = {name for part in parts for name in part}
-    if node.kind == SUM:
-        return {name: max(part.get(name, 0) for part in parts) for name in names}
-    if node.kind == PRODUCT:
-        if any(part and e < 0 for e, part in zip(node.data, parts, strict=True)):
+    if node.kind in (SUM, PRODUCT):
+        product = node.kind == PRODUCT
+        if product and any(part and e < 0 for e, part in zip(node.data, parts, strict=True)):
             raise Uncomputed(node)
-        return {name: sum(part.get(name, 0) for part in parts) for name in names}
+        together = sum if product else max
+        return {name: together(part.get(name, 0) for part in parts) for name in names}
     if not names:
         return {}
     if node.kind == POWER:
@@ -101,10 +101,9 @@ class Values:
         opened = [setting.meanings[name] for name in setting.opened(*trees) & {*setting.meanings}]
         highest = dict.fromkeys(setting.law.random, 0.0)
         for tree in [*trees, *opened]:
-            for _, node in walk(tree):
-                if node.kind == MEAN:
-                    for name, degree in degrees(node.parts[0], setting).items():
-                        highest[name] = max(highest[name], degree)
+            for mean in means_in(tree):
+                for name, degree in degrees(mean.parts[0], setting).items():
+                    highest[name] = max(highest[name], degree)
         # a component is made of several normal numbers
         states = setting.law.states
         highest |= dict.fromkeys(states, max((highest[x] for x in states), default=0.0))

@@ -11,12 +11,12 @@ from kfcourse.exercises.derivations.setting import Setting
 from kfcourse.exercises.derivations.slips import Slip, named, term_path
 from kfcourse.exercises.derivations.terms import (
     CALL,
-    MEAN,
     POWER,
     SUM,
     Node,
     at,
     letters,
+    means_in,
     walk,
     written,
 )
@@ -141,7 +141,7 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
         return RULES["noise"]
     states = set(setting.law.states)
     means, left = (
-        [mean_ for mean_ in _means(node) if letters(mean_) & states] for node in (above, line)
+        [mean for mean in means_in(node) if letters(mean) & states] for node in (above, line)
     )
     if kind == "moment" or len(means) > len(left):
         calls = any(inner.kind == CALL for mean in means for _, inner in walk(mean))
@@ -151,10 +151,6 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
     if kind in ("power", "lost-factor") and slip and slip.name not in setting.law.random:
         return RULES["constant"]
     return RULES["sign" if kind == "sign" else "noise" if noises else "terms"]
-
-
-def _means(node: Node) -> list[Node]:
-    return [inner for _, inner in walk(node) if inner.kind == MEAN]
 
 
 def _squares(node: Node) -> int:
