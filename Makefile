@@ -23,7 +23,7 @@ help:
 	@echo "make page NAME=beyond/drive   one page alone, to look at: half a minute; links to other pages lead nowhere"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
 	@echo "make nightly     the same, and the tests marked slow: coverage of intervals, hostile processes, all pages"
-	@echo "make quick       lint, types and the quick tests of the house, of formulas and of linear filters: a minute of CPU"
+	@echo "make quick       lint, types and the tests of the house, of formulas and of linear filters: a minute of CPU"
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
@@ -61,7 +61,7 @@ nightly:
 # Named, since pytest takes twenty seconds to collect all tests.
 QUICK := tests/test_house.py tests/test_laws.py tests/symbolic tests/linear
 quick: lint
-	$(BIN)/pytest -q -n 0 -m quick $(QUICK)
+	$(BIN)/pytest -q -n 0 $(CHOSEN) $(QUICK)
 
 # The types of the package as it is installed: with the exercises in it.
 TYPED := _build/typed

@@ -75,7 +75,6 @@ def snapshot(folder):
 # --- listing
 
 
-@pytest.mark.quick
 def test_variants_are_listed_with_titles_and_equations(call):
     result = call("variants")
     assert result.exit_code == 0
@@ -171,7 +170,6 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_threads_and_the_file(
 # --- mistakes
 
 
-@pytest.mark.quick
 def test_a_derivation_is_checked_line_by_line(call, tmp_path):
     file = tmp_path / "F.txt"
     right = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*M[(x-m)^2] + f^2*M[x^4]\n"
@@ -284,7 +282,6 @@ def test_filters_lists_which_are_admissible(call):
     refused(call("filters none --variants mine.toml"), "no variant 'none'")
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize("option", ["--runs 1", "--steps 0", "--seed -1", "--jobs 0"])
 def test_impossible_numbers_are_refused(call, no_computation, option):
     result = call("lab 53", option)

@@ -19,8 +19,6 @@ from kfcourse import (
 )
 from kfcourse.filters import aof, duof
 
-pytestmark = pytest.mark.quick
-
 MODEL = Model.define("0.9*x + a*v", "x + w", {"a": 1.0})
 JUMPS = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1.0])
 STRUCTURE = linearised(MODEL)

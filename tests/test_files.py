@@ -3,11 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
-import pytest
-
 from kfcourse.files import replacing
-
-pytestmark = pytest.mark.quick
 
 
 def test_two_threads_write_the_same_file(tmp_path):

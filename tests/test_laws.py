@@ -20,8 +20,6 @@ from kfcourse.laws import (
     transpose,
 )
 
-pytestmark = pytest.mark.quick
-
 
 @pytest.fixture
 def rng():

@@ -37,12 +37,11 @@ from kfcourse.symbolic.moments import GaussianMoments
 from kfcourse.symbolic.reading import normal_symbols
 from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
-# trajectories that may be stiff: the implicit method takes some hundredths of a second each
+# trajectories that may be stiff: the implicit method takes some tenths of a second each
 FEW = 64
-# between two measurements: of few trajectories, for which the implicit method is then faster; of
-# many, some seconds
-STEPS, MOST_STEPS = 2_000, 10_000
-SEEN = 100  # steps after which their length tells how many there will be
+# between two measurements: many trajectories take seconds for them, and few are faster by the
+# implicit method; after a twentieth of the steps their length tells how many there will be
+STEPS = 3_000
 # of a mean that has no variance a part that stands for the standard deviation: a billionth of the
 # mean is then right by the usual accuracy
 NEAR = 1e-3
@@ -241,13 +240,14 @@ def _integrated(
         )
         return float(max((np.abs(mean) / sd).max(), of_F.max(), of_Q.max()))
 
-    start, few = packed(z, np.eye(n), np.zeros((n, n))), z.size <= FEW * n
-    done = _run(rate, error, start, span, accuracy, STEPS if few else MOST_STEPS)
+    start = packed(z, np.eye(n), np.zeros((n, n)))
+    done = _run(rate, error, start, span, accuracy)
     if done is None and z.size > n:  # stiff
-        if not few:
+        if z.size > FEW * n:
             raise NotFinite(
-                f"the moment equations are stiff, and {z.size // n} trajectories would take "
-                f"minutes: run at most {FEW}, or replace the fastest component by its steady state"
+                f"the moment equations are stiff, or turn too fast for {STEPS} steps between two "
+                f"measurements, and {z.size // n} trajectories would take minutes: run at most "
+                f"{FEW}, measure more often, or replace the fastest component by its steady state"
             )
         each = zip(
             z.reshape(-1, 1, n), np.broadcast_to(p, square).reshape(-1, 1, n, n), strict=True
@@ -285,10 +285,9 @@ def _run(
     state: Array,
     span: float,
     accuracy: float,
-    most: int,
 ) -> Array | None:
     """The state after the span, by steps whose error stays below the accuracy; None if they are
-    more than `most`."""
+    more than `STEPS`."""
     s, h, earlier, slopes = 0.0, span, span, np.empty((7, state.size))
 
     def moved(weights: Array) -> Array:
@@ -296,10 +295,10 @@ def _run(
 
     with np.errstate(all="ignore"):  # a step that leaves the finite numbers is taken again, shorter
         slopes[0] = rate(s, state).ravel("F")
-        for done in range(most):
-            if done == SEEN // 2:
+        for done in range(STEPS):
+            if done == STEPS // 40:
                 earlier = h
-            if done == SEEN and span - s > 2 * most * h > most * earlier:
+            if done == STEPS // 20 and span - s > 2 * STEPS * h > STEPS * earlier:
                 break  # stability, not what comes, holds the steps so short: they will not do
             for i in range(1, 6):
                 slopes[i] = rate(s + RK45.C[i] * h, state + moved(RK45.A[i, :i])).ravel("F")

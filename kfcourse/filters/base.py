@@ -24,8 +24,8 @@ class State(NamedTuple):
     posterior : Gaussian
         Estimate z (runs, n) and its error covariance as the filter sees it, (..., n, n).
     predicted : Gaussian
-        Prediction lambda (runs, n) of the next state, and Psi (..., n, n).  The exact filter goes
-        without: NaN, and `ahead` finds them.
+        Prediction lambda (runs, n) of the next state, and Psi (..., n, n).  The exact filter and
+        particles go without: NaN, and `ahead` finds them.
     memory : object
         What else the filter remembers (grid, particles); None for most.
     expected : Measurement, optional
@@ -70,7 +70,8 @@ class Filter:
         (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its
         `posterior`.
     slow : bool
-        Thousands of times the cost of the others: comparisons run it on a part of the trajectories.
+        Thousands of times the cost of the others, and the memory: comparisons give it fewer
+        trajectories at a time.
     structure : Structure, optional
         For a filter whose laws are normal ones: the structural functions by which it expects
         measurements from its prediction, and predicts from its posterior.  Looking back, likelihood
@@ -112,6 +113,13 @@ def ahead(filter_: Filter, state: State) -> Gaussian:
         return state.predicted
     nothing = np.full((len(state.posterior.mean), filter_.model.p), np.nan)
     return filter_.step(state, nothing).posterior
+
+
+def without_prediction(step: int, posterior: Gaussian, memory: Any) -> State:
+    """The state of a filter that would have to move its memory for a prediction."""
+    return State(
+        step, posterior, Gaussian(*(np.full_like(part, np.nan) for part in posterior)), memory
+    )
 
 
 def structure_of(filter_: Filter, what: str) -> Structure:

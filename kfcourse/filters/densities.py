@@ -59,14 +59,16 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
             f"measurement {model.p}: "
             "use particle(model)"
         )
-    mean, variance = _law(
+    mean, variance = law_given_state(
         model, "object", model.difference_equation("a density"), model.v, model.state_noise
     )
     if omega := noise_of_meter(model):
         z = (omega - model.meter_noise.mean[0]) / sp.Float(np.sqrt(model.meter_noise.cov[0, 0]))
         deviation = 1 / sp.Abs(z.diff(Y))
         return ScalarFormulas(mean[0], sp.sqrt(variance[0]), Y - z * deviation, deviation)
-    meter, meter_variance = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
+    meter, meter_variance = law_given_state(
+        model, "meter", model.meter_equation, model.w, model.meter_noise
+    )
     return ScalarFormulas(mean[0], sp.sqrt(variance[0]), meter[0], sp.sqrt(meter_variance[0]))
 
 
@@ -77,7 +79,7 @@ def likelihood(model: Model) -> LogLikelihood:
     The law of a component that is an angle is wound around the circle: the densities of y and of y
     plus whole turns add up.
     """
-    mean, cov = _law(model, "meter", model.meter_equation, model.w, model.meter_noise)
+    mean, cov = law_given_state(model, "meter", model.meter_equation, model.w, model.meter_noise)
     law = model.compiled([model.x], [list(mean), cov])
     if model.p > 1 and _singular(law, model):
         raise ModelError(
@@ -120,7 +122,7 @@ def wound(density: Callable[[Array], Array], sd: Array, angles: Components) -> A
     return total
 
 
-def _law(
+def law_given_state(
     model: Model, what: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian
 ) -> tuple[sp.MatrixBase, sp.MatrixBase]:
     """Mean and covariance of what an equation gives, as formulas; ModelError if they are not those

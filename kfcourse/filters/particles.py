@@ -41,7 +41,7 @@ import numpy as np
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Filter, State, initial_state, without_prediction
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import (
     Array,
@@ -64,15 +64,12 @@ ROUNDS = 2
 # step in s by which slopes are found, in standard deviations: from 1e-6 to 1e-2 as many particles
 # count
 SMALL = 1e-4
-# width of a law of s: the root of a nearly singular covariance is right to as much
-NARROWEST = 1e-7
 # the law around the mode, whose tails the posterior's must not exceed: of 500 particles 430 count
 # on variant 53, by twice or half the width 256
 WIDER = 1.2
 # share drawn from N(0, I) and of modes drawn by pi, for what a normal law does not see: no weight
 # is above 1 / PRIOR of what N(0, I) gives; half of it, and 451 of 500 count
 PRIOR = 0.1
-LARGEST = 1e70  # variances by fourth powers of larger states are infinite
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,7 +244,8 @@ class Sampler:
         rng = memory.generator(self.seed, len(y), k)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             x, mode, logs = self.drawn(rng, memory, y, k)
-            lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))
+            # of larger states the variances, by fourth powers, are infinite
+            lost = np.asarray(~np.isfinite(x**4).all(axis=-1))
             x = np.where(lost[..., None], self.modes[0].model.prior.mean, x)
             likelihoods = [each.log_likelihood(y[:, None, None], x, k) for each in self.modes]
             logs = np.where(lost, -np.inf, logs + np.choose(mode, likelihoods))
@@ -257,22 +255,12 @@ class Sampler:
             kept = _systematic(rng, weights)
             x = np.take_along_axis(x, kept[..., None], axis=2)
             mode = np.take_along_axis(mode, kept, axis=2)
-            predicted = self.ahead(rng, x, mode, k)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         memory = Clouds(
             np.moveaxis(law.mean, 1, 0), effective, log_mean.T, x, mode,
             np.stack(counts, axis=-1), memory.part,
         )  # fmt: skip
-        return State(k + 1, _of_both(*law, self.angles), predicted, memory)
-
-    def ahead(self, rng: np.random.Generator, x: Array, mode: Array, k: int) -> Gaussian:
-        """The law of the next state, from particles that move."""
-        moves = [
-            each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in self.modes
-        ]
-        moved = np.choose(_chosen(rng, self.chances(x, mode, k))[..., None], moves)
-        equal = np.full(mode.shape, 1 / self.size)
-        return _of_both(*weighted(moved, equal, self.angles), self.angles)
+        return without_prediction(k + 1, _of_both(*law, self.angles), memory)
 
 
 class Mode(NamedTuple):
@@ -346,7 +334,8 @@ class Mode(NamedTuple):
 def _wide(rng: np.random.Generator, law: Gaussian) -> tuple[Array, Array]:
     """s (..., r) by a mixture of a wider normal law and of N(0, I), and ln N(s; 0, I) / q."""
     shape, r = law.mean.shape[:-1], law.mean.shape[-1]
-    cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + NARROWEST**2 * np.eye(r)
+    # 1e-14: what rounding may take from a nearly singular covariance of parts of 1
+    cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + 1e-14 * np.eye(r)
     root = WIDER * np.linalg.cholesky(cov)
     normal, plain = rng.standard_normal(law.mean.shape), rng.random(shape) < PRIOR
     s = np.where(plain[..., None], normal, law.mean + apply(root, normal))

@@ -26,11 +26,12 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.errors import expect
+from kfcourse.filters.densities import law_given_state
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.statistics import Estimate, means_without_each
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.sides import jumps
 
 # of one trajectory in a mean of information: where it is more, the mean is infinite, or as good as
@@ -110,21 +111,14 @@ def _information(
         raise ValueError(
             _infinite(what, "it jumps, and a jump has no slope: slopes elsewhere do not tell of it")
         )
-    slopes = equation.jacobian(sp.Matrix(noise))
-    if slopes.has(*noise):
-        raise ModelError(
-            f"a noise enters the {what} equation nonlinearly; the bound needs normal densities "
-            f"given the state"
-        )
-    at_mean = dict(zip(noise, exact_matrix(law.mean), strict=True)) | model.values
-    B = slopes.subs(model.values)
-    S = (B * exact_matrix(law.cov) * B.T).applyfunc(sp.expand)
+    mean, cov = law_given_state(model, what, equation, noise, law)
+    S = cov.subs(model.values).applyfunc(sp.expand)
     if S.det().expand() == 0:
         raise ModelError(
             f"the {what} equation leaves a component without noise: there is no density, and no "
             f"bound of this kind"
         )
-    slope = equation.subs(at_mean).jacobian(sp.Matrix(model.x))
+    slope = mean.subs(model.values).jacobian(sp.Matrix(model.x))
     functions = model.compiled([model.x], [slope, S, *(S.diff(x) for x in model.x)])
 
     def at(x: Array, k: int) -> tuple[Array, Array, Array]:

@@ -135,7 +135,12 @@ def estimate(
 
     t = np.where(logs, np.log(np.where(logs, start, 1.0)), start)
     unit = np.where(logs | (start == 0), 1.0, np.abs(start))
-    log_likelihood(t)  # says what is wrong with the start
+    # what else is wrong with the start is said there; beyond, squares of derivatives are infinite
+    if abs(log_likelihood(t)) > 1e100:
+        raise ValueError(
+            "at the start of the search the measurements are many powers of ten away from what "
+            "the model expects of them: look for the row, or change the units"
+        )
     with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
         # the second time in the units that the likelihood has at its maximum
         for _ in range(1 if logs.all() else 2):

@@ -198,8 +198,6 @@ def _below(degrees: Array, edge: float) -> tuple[Array, Array]:
     With the distribution function P_d of d degrees:  M[c; c < g] = d P_{d+2}(g),   M[c^2; c < g] =
     d (d + 2) P_{d+4}(g).
     """
-    if edge == 1:
-        return degrees.astype(float), 2.0 * degrees
     g = scipy.special.chdtri(degrees, 1 - edge)
     mean = degrees * scipy.special.chdtr(degrees + 2, g) / edge
     return mean, degrees * (degrees + 2) * scipy.special.chdtr(degrees + 4, g) / edge - mean**2

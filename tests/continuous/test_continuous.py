@@ -24,9 +24,6 @@ from kfcourse.continuous import (
 from kfcourse.filters import aof
 from kfcourse.symbolic.equations import compile_model
 
-pytestmark = pytest.mark.quick
-
-
 N_VECTOR = [[0.3, 0.1], [0.1, 0.2]]
 S_VECTOR = [[0.8, 0.2], [0.2, 0.5]]
 

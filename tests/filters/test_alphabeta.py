@@ -11,8 +11,6 @@ from kfcourse.filters.alphabeta import steady_alpha, steady_beta, tracking_index
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
 
-pytestmark = pytest.mark.quick
-
 T = 0.7
 ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion
 

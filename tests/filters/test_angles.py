@@ -44,8 +44,6 @@ from kfcourse.filters.optimal_structure import Memory, Remembered
 from kfcourse.linear.consistency import innovations, nees
 from kfcourse.scenarios.navigation import Dynamics, Observation, Sensor, fuse
 
-pytestmark = pytest.mark.quick
-
 PI = np.pi
 FINE = partial(pointmass, accuracy=1e-3)
 

@@ -15,9 +15,6 @@ from kfcourse.filters import notation as s
 from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS
 from kfcourse.montecarlo.ensemble import Instant
 
-pytestmark = pytest.mark.quick
-
-
 # ---------------------------------------------------------------- the printed equations, executed
 
 

@@ -24,8 +24,6 @@ from kfcourse.filters import duof, fos, gated, imm, kalman_filter, mfos, particl
 from kfcourse.linear.consistency import innovations
 from kfcourse.records import weights
 
-pytestmark = pytest.mark.quick
-
 
 def walk(**options):
     return Model.define(

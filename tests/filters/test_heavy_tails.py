@@ -8,8 +8,6 @@ from kfcourse import Model, linearised, run
 from kfcourse.filters import robust
 from kfcourse.records import weights
 
-pytestmark = pytest.mark.quick
-
 PRIOR_MEAN, PRIOR_COV = np.array([1.0, -0.5]), np.array([[0.9, 0.3], [0.3, 0.6]])
 NOISE = np.array([[0.5, 0.2], [0.2, 0.3]])
 

@@ -40,8 +40,6 @@ from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.montecarlo.experiment import walk
 from kfcourse.symbolic.averaging import averaged
 
-pytestmark = pytest.mark.quick
-
 ROUNDING = 1e-10
 SEQUENTIAL = [imm, logic_dynamic, gpb2]
 SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10.0}}}

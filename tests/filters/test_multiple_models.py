@@ -11,8 +11,6 @@ from kfcourse.filters import gpb2, imm, logic_dynamic
 from kfcourse.linear.system import linear_system
 from kfcourse.montecarlo.experiment import states
 
-pytestmark = pytest.mark.quick
-
 ROUNDING = 1e-10  # relative; some tens of steps, with likelihoods in between
 
 PRIOR = {"mean": [1.0, -0.5], "variance": [[2.0, 0.3], [0.3, 1.0]]}

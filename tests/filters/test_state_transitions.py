@@ -14,8 +14,6 @@ from kfcourse.filters.multiple_models import by_state
 from kfcourse.montecarlo.experiment import walk
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
-pytestmark = pytest.mark.quick
-
 FAR = [["0.98*exp(-x**2/8)", "1 - 0.98*exp(-x**2/8)"], ["0.3*exp(-x**2/8)", "1 - 0.3*exp(-x**2/8)"]]
 
 

@@ -27,8 +27,6 @@ from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.scenarios.navigation import Sensor
 from kfcourse.symbolic.equations import compile_model, compile_noiseless
 
-pytestmark = pytest.mark.quick
-
 STEPS = 6
 U = list(oracles.Changing.U)
 

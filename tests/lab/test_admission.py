@@ -6,8 +6,6 @@ from kfcourse import Model
 from kfcourse.lab import FILTERS
 from kfcourse.lab.admission import admissions
 
-pytestmark = pytest.mark.quick
-
 
 def verdicts(model, names=tuple(FILTERS)):
     return {each.name: each for each in admissions(model, names)}

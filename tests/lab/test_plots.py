@@ -13,8 +13,6 @@ from kfcourse import compare, lab_filters, load_variants
 from kfcourse.lab import FILTERS, LAB, plots, title
 from kfcourse.lab.families import FAMILIES, look
 
-pytestmark = pytest.mark.quick
-
 SIDE_BY_SIDE = [  # the bound, the AOF, the DUOF, and what stands beside them
     ("kalman", "aof", "duof", "fos", "mfos", "fos3", "mfos3"),
     ("kalman", "aof", "duof", "fos", "mfos", "dfmp", "mdfmp"),

@@ -159,7 +159,6 @@ def sentences(leaders, last, language):
     return list(report(language).sentences(verdicts))
 
 
-@pytest.mark.quick
 def test_the_conclusion_counts_in_good_language():
     """One step or several, of 51; and who is not significantly worse than the best is not called
     the last at that step."""
@@ -218,7 +217,6 @@ def test_a_filter_that_diverges_is_no_last_with_a_number(language):
     assert alone.mean_sentence("mean_bound").endswith(alone.title("aof-gaussian") + ".")
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     ("number", "russian", "english"),
     [
@@ -239,7 +237,6 @@ def test_a_number_and_its_word(number, russian, english):
     )
 
 
-@pytest.mark.quick
 def test_both_languages_have_the_same_words_with_the_same_places():
     russian, english = WORDS["ru"], WORDS["en"]
     assert set(russian) == set(english)

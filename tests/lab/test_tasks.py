@@ -9,8 +9,6 @@ from kfcourse import JumpModel, Model, gaussian, linearised, load_variants, simu
 from kfcourse.lab import VariantError, find_variant, read_variant
 from kfcourse.lab.variants import read_variants
 
-pytestmark = pytest.mark.quick
-
 TASKS = {name: find_variant(name) for name in ("D1", "D2", "D3", "J1", "J2", "J3", "J4")}
 BETWEEN = {name: find_variant(name) for name in ("C1", "C2", "C3", "CD1", "CD2", "CD3")}
 

@@ -13,8 +13,6 @@ from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, ti
 from kfcourse.lab import variants as of_variants
 from kfcourse.lab.variants import VariantWarning, chosen_variants, read_variants
 
-pytestmark = pytest.mark.quick
-
 SHIPPED = load_variants()
 GOOD = 'state = "0.9*x + v"\nmeter = "x + w"\n'
 

@@ -19,9 +19,6 @@ from kfcourse.linear.consistency import (
     nis,
 )
 
-pytestmark = pytest.mark.quick
-
-
 # ---------------------------------------------------------------- quantities
 
 

@@ -7,8 +7,6 @@ import pytest
 from kfcourse import Gaussian
 from kfcourse.linear import LinearSystem, em_rounds, simulate
 
-pytestmark = pytest.mark.quick
-
 
 def log_density(system, prior, y):
     """ln p(y) of all runs, each by one dense regression."""

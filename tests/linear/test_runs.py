@@ -11,8 +11,6 @@ from kfcourse import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.linear.arithmetic import FORMS
 
-pytestmark = pytest.mark.quick
-
 # Conditions of the covariances below are up to 1e4: rounding of float64 (1e-16) times that, over a
 # dozen steps.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}

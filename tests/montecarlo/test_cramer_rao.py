@@ -13,8 +13,6 @@ from kfcourse.filters import kalman_filter
 from kfcourse.lab import find_variant
 from kfcourse.montecarlo.cramer_rao import _mean, posterior_bound
 
-pytestmark = pytest.mark.quick
-
 
 def test_on_a_linear_model_it_is_the_kalman_filter_s_covariance():
     """Matrices that change with the step, correlated noises with means; no trajectory enters."""
@@ -135,7 +133,7 @@ def test_an_infinite_mean_is_seen_in_several_dimensions_too():
             ["x1 + w1", "x2"],
             "meter equation leaves a component without noise",
         ),
-        ("x + exp(v)", "x + w", "noise enters the state equation nonlinearly"),
+        ("x + exp(v)", "x + w", "the noise enters nonlinearly"),
     ],
 )
 def test_without_a_normal_density_there_is_none(state, meter, message):

@@ -26,8 +26,6 @@ from kfcourse.laws import gain
 from kfcourse.montecarlo.ensemble import side_by_side
 from kfcourse.montecarlo.experiment import _begun
 
-pytestmark = pytest.mark.quick
-
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
 
 

@@ -15,8 +15,6 @@ from kfcourse.montecarlo.ensemble import side_by_side
 from kfcourse.montecarlo.experiment import batch_sizes, states
 from kfcourse.montecarlo.scores import crps, scored
 
-pytestmark = pytest.mark.quick
-
 
 def by_quadrature(y, means, deviations, weights=(1.0,)):
     """Integral of (P - [. >= y])^2 for a mixture, in pieces between all the places of note."""

@@ -3,8 +3,6 @@
 import build
 import pytest
 
-pytestmark = pytest.mark.quick
-
 
 class Begun(Exception):
     """The build has begun."""

@@ -3,8 +3,6 @@
 import pytest
 from ext import docstrings
 
-pytestmark = pytest.mark.quick
-
 
 @pytest.mark.parametrize(
     ("paragraph", "equation"),

@@ -17,7 +17,6 @@ from kfcourse.filters.kalman import correct, predict
 from kfcourse.linear import LinearSystem
 from kfcourse.pages import Unverified
 
-pytestmark = pytest.mark.quick
 RUN = world(
     shared.KALMAN + "\nk: range 1 4\nz = z_2\nK = K_2\n\\lambda = \\lambda_2\n\\nu = \\nu_2"
 )(np.random.default_rng(1))

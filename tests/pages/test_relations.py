@@ -20,7 +20,6 @@ from gate.plant import written
 
 from kfcourse.pages import Unverified
 
-pytestmark = pytest.mark.quick
 PAGES = written()
 
 

@@ -7,8 +7,6 @@ import sympy as sp
 from kfcourse.pages import table
 from kfcourse.symbolic.typesetting import WIDTH, equation_latex, symbols
 
-pytestmark = pytest.mark.quick
-
 
 def test_a_table_aligns_numbers_and_marks_what_is_not_there():
     shown = table(

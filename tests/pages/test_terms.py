@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from ext import previews, terms
 
-pytestmark = pytest.mark.quick
 BOOK = Path(terms.__file__).parents[1]
 
 

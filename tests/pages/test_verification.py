@@ -7,8 +7,6 @@ import sympy as sp
 from kfcourse.pages import Unverified, agree, claim, typeset, verified
 from kfcourse.pages.verification import VERIFIED
 
-pytestmark = pytest.mark.quick
-
 x, z = sp.symbols("x z", real=True)
 p = sp.Symbol("p", positive=True)
 K = sp.Symbol("K")

@@ -11,8 +11,6 @@ from kfcourse.records import estimate, profile
 from kfcourse.records.estimation import _derivatives
 from kfcourse.scenarios.benchmarks import local_level, nile
 
-pytestmark = pytest.mark.quick
-
 
 def test_the_nile_s_variances():
     estimated = estimate(
@@ -100,6 +98,8 @@ def test_a_start_without_a_likelihood_says_why():
     model = Model.define("x", "g*x", {"g": 1.0}, prior={"mean": 1, "variance": 0})
     with pytest.raises(ValueError, match="no density for the measurement of step 0"):
         estimate(model, np.ones((3, 1, 1)), ["g"])
+    with pytest.raises(ValueError, match="many powers of ten away"):
+        estimate(Model.define("x", "g*x + w", {"g": 1}), np.array([1.0, 1e120]), ["g"])
 
 
 def test_a_search_that_leaves_the_model_names_the_parameter():

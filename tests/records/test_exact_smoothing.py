@@ -12,8 +12,6 @@ from kfcourse.filters import aof, kalman_filter, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
 from kfcourse.lab import find_variant
 
-pytestmark = pytest.mark.quick
-
 
 def off(smoothed, expected):
     """Means in standard deviations, and variances, relative: (steps, runs)."""

@@ -11,8 +11,6 @@ from numpy.testing import assert_array_equal
 from kfcourse import Model, ModelError, read_measurements
 from kfcourse.records.reading import RecordError, RecordWarning
 
-pytestmark = pytest.mark.quick
-
 WALK = Model.define(
     ["x + dt*u", "u + a*dt + sqrt(q*dt)*v"],
     ["x + w1", "u + w2"],

@@ -23,8 +23,6 @@ from kfcourse.filters import aof, duof, imm, iterated, kalman_filter, pointmass
 from kfcourse.records import smooth_iterated
 from kfcourse.symbolic.equations import compile_noiseless
 
-pytestmark = pytest.mark.quick
-
 STRUCTURES = {
     "linearised": linearised,
     "gaussian": gaussian,

@@ -7,8 +7,6 @@ from numpy.testing import assert_allclose
 from kfcourse import simulate
 from kfcourse.scenarios.ballistic import thrown_body
 
-pytestmark = pytest.mark.quick
-
 
 def test_without_drag_and_noise_it_flies_a_parabola():
     vague, steps, T, gravity = 1e-9, 20, 0.25, 9.0

@@ -2,7 +2,6 @@
 held against the filters in the chapter on the literature."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
@@ -16,7 +15,6 @@ from kfcourse.scenarios.benchmarks import (
 from kfcourse.symbolic.equations import compile_noiseless
 
 
-@pytest.mark.quick
 def test_the_attractor_is_that_of_lorenz():
     """One step of Heun's rule against SciPy's: it errs by some hundredths here, as its error is of
     third order; Euler's by .3."""

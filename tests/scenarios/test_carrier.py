@@ -7,8 +7,6 @@ from numpy.testing import assert_allclose
 from kfcourse import simulate
 from kfcourse.scenarios.carrier import PARAMETERS, phase_meter
 
-pytestmark = pytest.mark.quick
-
 
 @pytest.mark.parametrize(("order", "offset"), [(1, 0.0), (2, 40.0)])
 def test_without_noise_it_is_a_cosine(order, offset):

@@ -10,8 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from kfcourse.scenarios.drive import RADIUS, fixes, recorded, turned
 
-pytestmark = pytest.mark.quick
-
 DATA = resources.files("kfcourse.scenarios") / "data"
 
 

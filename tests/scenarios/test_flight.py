@@ -15,8 +15,6 @@ from kfcourse.scenarios.radar import (
     spherical,
 )
 
-pytestmark = pytest.mark.quick
-
 # Not the defaults: every number different.
 OTHER = dict(speeds=(180.0, 110.0), radii=(4_000.0, 9_000.0), descent=7.0, ramp=6.0)
 

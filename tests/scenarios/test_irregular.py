@@ -2,12 +2,9 @@
 
 import numpy as np
 import oracles
-import pytest
 from numpy.testing import assert_array_equal
 
 from kfcourse.scenarios.irregular import irregular_track
-
-pytestmark = pytest.mark.quick
 
 
 def test_shares_and_sizes_are_those_asked_for():

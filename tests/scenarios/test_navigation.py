@@ -26,8 +26,6 @@ from kfcourse.scenarios.navigation import (
     sample,
 )
 
-pytestmark = pytest.mark.quick
-
 # Position and velocity driven by a known acceleration, with white noise of both; everything
 # non-unit.
 A = np.array([[0.0, 1.0], [-0.04, -0.3]])

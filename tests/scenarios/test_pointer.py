@@ -15,8 +15,6 @@ from kfcourse.scenarios.pointer import (
 )
 from kfcourse.scenarios.radar import kinematic
 
-pytestmark = pytest.mark.quick
-
 # ---------------------------------------------------------------- the model
 
 

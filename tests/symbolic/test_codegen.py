@@ -11,8 +11,6 @@ from kfcourse import Model, ModelError, linearised
 from kfcourse.symbolic.codegen import _compiled, _shared, compile_function
 from kfcourse.symbolic.formula import symbol
 
-pytestmark = pytest.mark.quick
-
 x1, x2, p11, p12, p22 = sp.symbols("x1 x2 p11 p12 p22", real=True)
 ARGUMENTS = [[x1, x2], sp.Matrix([[p11, p12], [p12, p22]])]
 

@@ -11,8 +11,6 @@ import sympy as sp
 from kfcourse import FormulaError
 from kfcourse.symbolic.formula import check_name, parse, symbol
 
-pytestmark = pytest.mark.quick
-
 NAMES = {name: symbol(name) for name in ("x", "v", "w", "c", "f")}
 x, v, c = NAMES["x"], NAMES["v"], NAMES["c"]
 

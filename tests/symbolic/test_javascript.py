@@ -7,8 +7,6 @@ import sympy as sp
 from kfcourse import ModelError
 from kfcourse.symbolic import javascript
 
-pytestmark = pytest.mark.quick
-
 x, y, c = sp.symbols("x y c", real=True)
 
 

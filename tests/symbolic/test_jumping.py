@@ -8,8 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from kfcourse import FormulaError, JumpModel, Model, ModelError, simulate
 from kfcourse.symbolic.averaging import averaged_equations
 
-pytestmark = pytest.mark.quick
-
 MODES = {"sound": {"parameters": {"C": 1}}, "faulty": {"parameters": {"C": 10}}}
 
 

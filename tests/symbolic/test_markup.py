@@ -6,8 +6,6 @@ import pytest
 
 from kfcourse.symbolic.markup import mathml
 
-pytestmark = pytest.mark.quick
-
 
 def shown(latex):
     """The text with a | for every thin space."""

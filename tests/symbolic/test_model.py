@@ -9,8 +9,6 @@ from kfcourse.symbolic import javascript
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import nothing_random
 
-pytestmark = pytest.mark.quick
-
 
 def test_strings_expressions_and_matrices_give_the_same_model():
     x, v, w = sp.symbols("x v w")  # without assumptions: recognised by name

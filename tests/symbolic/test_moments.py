@@ -7,8 +7,6 @@ import sympy as sp
 
 from kfcourse import GaussianMoments, NoClosedForm
 
-pytestmark = pytest.mark.quick
-
 x, y, m, mu = sp.symbols("x y m mu", real=True)
 d, q = sp.symbols("d q", positive=True)
 scalar = GaussianMoments([x], [m], sp.Matrix([[d]]))

@@ -10,8 +10,6 @@ from numpy.testing import assert_allclose
 from kfcourse import Model, ModelError, NoClosedForm, gauss_hermite, gaussian, linearised, unscented
 from kfcourse.symbolic.equations import compile_model
 
-pytestmark = pytest.mark.quick
-
 KINDS = {
     "linearised": linearised,
     "gaussian": gaussian,

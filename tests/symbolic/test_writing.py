@@ -8,8 +8,6 @@ from kfcourse import Model, gaussian
 from kfcourse.symbolic.typesetting import Printer, with_index
 from kfcourse.symbolic.writing import _Writer, formula_latex, formula_lines, number_latex
 
-pytestmark = pytest.mark.quick
-
 x, v, w, z, p, m, d = sp.symbols("x v w z p m d", real=True)
 c = sp.Symbol("c", real=True)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.errors import expect
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Filter, State, initial_state, without_prediction
 from kfcourse.filters.exact.columns import (
     ERROR,
     EVIDENCE,
@@ -194,7 +194,7 @@ class Exact:
         k, before = state.step, state.memory
         memory, law = self._advance(f"step {k}", k, y[:, 0], before)
         memory = memory._replace(error=before.error + memory.error)
-        return State(k + 1, law, Gaussian(*(np.full_like(part, np.nan) for part in law)), memory)
+        return without_prediction(k + 1, law, memory)
 
     def look_back(self, states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         """`Filter.look_back` of a model without modes."""

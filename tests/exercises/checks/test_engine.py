@@ -12,8 +12,6 @@ from kfcourse.exercises.checks.engine import check
 from kfcourse.exercises.checks.equality import Unusable, equal, equal_formulas, like
 from kfcourse.exercises.checks.question import MIME, Mistake, Question
 
-pytestmark = pytest.mark.quick
-
 CUBE = asks(lambda a, b: a**3 + b, [(x, y)])
 ROOTS = asks(lambda a, b: sp.sqrt(a * b), [(p, d)])
 

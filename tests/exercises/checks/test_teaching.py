@@ -12,8 +12,6 @@ from kfcourse.exercises.checks.diagnosis import GENERAL
 from kfcourse.exercises.checks.engine import FOLLOWS, check
 from kfcourse.exercises.checks.question import MIME, Attempts, Mistake, Question
 
-pytestmark = pytest.mark.quick
-
 A = np.array([2.0, 3.0])
 
 

@@ -10,10 +10,7 @@ from kfcourse.exercises.checks import engine, reference
 from kfcourse.exercises.checks.question import Mistake
 from kfcourse.limits import AGAIN, OutOfTime, time_limit
 
-pytestmark = [
-    pytest.mark.quick,
-    pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here"),
-]
+pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
 
 
 @pytest.mark.parametrize(

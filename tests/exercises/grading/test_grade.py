@@ -347,7 +347,6 @@ def graded_here(tmp_path):
     return graded
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize("name", IN_PROCESS)
 def test_only_what_a_student_wrote_counts(graded_here, name):
     notebook, marks, note = IN_PROCESS[name]
@@ -643,7 +642,6 @@ PLAIN = [
 ]
 
 
-@pytest.mark.quick
 def test_cells_of_the_student_keep_their_places():
     own = {0: "first = 1", 2: "before = 1", 4: "between = 1", 6: "after = 1", 10: "last = 1"}
     notebook = solved(

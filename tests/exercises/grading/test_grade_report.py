@@ -44,7 +44,6 @@ def graded(name, letter="b", variant="53", passed=(), student="", work="w", look
     return Grade(name, "graded", letter, variant, results, (), looks, name, student, work)
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     ("name", "student", "course", "expected"),
     [
@@ -107,7 +106,6 @@ def test_without_a_list_a_folder_is_a_student():
     assert strangers == []
 
 
-@pytest.mark.quick
 def test_points_are_the_weights_of_the_levels():
     assert possible("abc") == sum(possible("abc", level) for level in WEIGHTS)
     assert points([graded("x", passed=EVERYTHING)], USUAL) == possible("b")
@@ -115,7 +113,6 @@ def test_points_are_the_weights_of_the_levels():
     assert points([grade], USUAL) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     ("credit", "expected"),
     [

@@ -20,7 +20,6 @@ def sent(value):
     return decode(json.loads(json.dumps(encode(value))))
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     "value",
     [
@@ -108,7 +107,6 @@ STRANGE = [
 ]
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize("data", STRANGE, ids=lambda data: str(data)[:40])
 def test_strange_messages_are_refused(data):
     with pytest.raises(ProtocolError):

@@ -67,7 +67,6 @@ def contents(folder):
 # -- masters
 
 
-@pytest.mark.quick
 def test_solution_and_stub():
     student, solution = handed_out(), solved()
     answer = code(student)[1]
@@ -85,7 +84,6 @@ def test_solution_and_stub():
     assert "correct_name = correct.__name__" in texts[0]  # what stands behind the end marker stays
 
 
-@pytest.mark.quick
 def test_notebook_knows_its_set_and_variant():
     notebook = tiny("7")
     assert notebook.metadata["kfcourse"] == {"set": "b", "variant": "7"}
@@ -98,7 +96,6 @@ AFTER = "END SOLUTION without BEGIN SOLUTION before it"
 WITHOUT = "BEGIN SOLUTION without END SOLUTION"
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -120,7 +117,6 @@ def test_errors_of_a_master_name_the_place(old, new, message):
         tiny(text=TINY.replace(old, new, 1))
 
 
-@pytest.mark.quick
 def test_statement_is_a_page_without_solutions_and_what_draws_is_folded_under_its_picture():
     drawn = next(cell.id for cell in tiny().cells if "picture" in cell.metadata.get("tags", []))
     page = statement(tiny(), {drawn: ("drawn.png", 720)})
@@ -148,7 +144,6 @@ def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
 x, y, c = sp.symbols("x y c", real=True)
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     "formula",
     [
@@ -261,7 +256,6 @@ def test_without_a_browser_it_is_said(tmp_path, monkeypatch):
         execution.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
 
 
-@pytest.mark.quick
 def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters, monkeypatch):
     monkeypatch.setattr(jobs, "execute", execute_inside)
     text = TINY.replace("cross = G @ Psi", "cross = 2 * G @ Psi")
@@ -431,7 +425,6 @@ def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
     assert (student.name, student.group) == ("Иванов, Иван", "М-1")
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     ("text", "message"),
     [

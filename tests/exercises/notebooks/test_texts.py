@@ -11,8 +11,6 @@ from kfcourse.exercises.grading.results import Grade, write_table
 from kfcourse.exercises.notebooks.course_list import Student, save_assignment
 from kfcourse.exercises.notebooks.texts import cautious, clean, plain
 
-pytestmark = pytest.mark.quick
-
 # What Excel, LibreOffice or Google's sheets take for formulas: at once, or after they have taken
 # away what is before it.
 FORMULAS = [

@@ -5,8 +5,6 @@ import pytest
 from kfcourse.exercises.checks import ExerciseError, exercise
 from kfcourse.lab import VariantError
 
-pytestmark = pytest.mark.quick
-
 
 def test_no_such_set_question_or_variant():
     with pytest.raises(ExerciseError, match="no exercise set 'zz'; there are a, b"):

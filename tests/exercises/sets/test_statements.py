@@ -24,7 +24,6 @@ ANSWERS = re.compile(  # to questions in words
 )
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(("letter", "variant"), weekly(PAIRS))
 def test_what_students_get(letter, variant):
     """Stubs that a key can be put into, with nothing that is not in the solution too; run, they fail
@@ -59,7 +58,6 @@ def test_worked_solutions_pass(letter, variant):
     assert any(ANSWERS.search(each.source) for each in worked.cells) == (letter != "s")
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize("letter", sets())
 def test_every_question_has_a_task_and_a_hint(letter):
     parts = re.split(r'\[= heading\("(\w+)".*', read(letter))
