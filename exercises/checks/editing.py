@@ -149,15 +149,14 @@ def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast
                 yield kind, ast.BinOp(left, opposite(), right)
             if isinstance(op, ast.MatMult):
                 yield "other-order", ast.BinOp(right, op, left)
-            lost = LOST.get(type(op), "")
-            if lost:
+            if lost := LOST.get(type(op)):
                 yield lost, left
-            if lost and isinstance(op, ast.Add | ast.Mult | ast.MatMult):
-                yield lost, right
-            if isinstance(op, ast.Sub):
-                yield lost, ast.UnaryOp(ast.USub(), right)
-            if isinstance(op, ast.Div):
-                yield lost, ast.BinOp(ast.Constant(1), op, right)
+                if isinstance(op, ast.Sub):
+                    yield lost, ast.UnaryOp(ast.USub(), right)
+                elif isinstance(op, ast.Div):
+                    yield lost, ast.BinOp(ast.Constant(1), op, right)
+                elif not isinstance(op, ast.Pow):
+                    yield lost, right
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             yield "one-sign-wrong", operand
         case ast.Attribute(value=value, attr="T"):

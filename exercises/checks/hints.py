@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import combinations
 from typing import Any
@@ -28,7 +28,7 @@ SECONDS = 10.0  # for the search among changes of the key
 ROUNDING = 1e-13  # of what cancels, beside what should be there
 
 Said = tuple[str, str]
-Row = tuple[str, str, Callable[[], Sequence[Any]]]  # name, sentence, what would have been found
+Row = tuple[str, str, Callable[[], Iterable[Any]]]  # name, sentence, what would have been found
 
 
 def each(value: Any, change: Callable[[Any], Any]) -> Any:
@@ -71,27 +71,27 @@ def results(case: Case) -> Iterator[Row]:
     """The right result with one simple thing done to it, another result, or an argument as it
     came."""
     values = case.posed.values
-    mine, right = (set().union(*map(symbols, side)) for side in (case.answered, case.expected))
+    mine, right = map(symbols, (case.answered, case.expected))
     if {s.name for s in values} & right - mine:
         yield (
             "numbers-for-symbols",
             "Right in numbers, but the parameters are asked for as symbols: type their letters "
             "where their values stand.",
-            partial(applied, lambda formula: with_values(formula, values), case.expected),
+            partial(map, lambda formula: with_values(formula, values), case.expected),
         )
     yield (
         "is-zero",
         "It is zero: is that what is left when all cancels, or is something multiplied by zero?",
-        partial(applied, nothing, case.answered, case.expected),
+        partial(map, nothing, case.answered, case.expected),
     )
     for name, says, change in OF_RESULT:
-        yield name, says, partial(applied, change, case.expected)
+        yield name, says, partial(map, change, case.expected)
     for decimals in range(1, 9) if case.numeric else ():
         rounded = partial(np.round, decimals=decimals)
         yield (
             "low-precision",
             "It is rounded: hand in all digits.",
-            partial(applied, rounded, case.expected),
+            partial(map, rounded, case.expected),
         )
     for name, expected in case.others:
         yield (
@@ -105,7 +105,7 @@ def results(case: Case) -> Iterator[Row]:
             yield (
                 "argument-unchanged",
                 f"That is the argument `{name}`, unchanged.",
-                partial(applied, np.nan_to_num, given),
+                partial(map, np.nan_to_num, given),
             )
 
 
@@ -142,7 +142,7 @@ def arguments(case: Case) -> Iterator[Row]:
         ):
             much = "added, or forgotten" if kind == "term" else "too many, or forgotten"
             says = f"It is right but for a {kind} that is {of}{what}: {much}?"
-            yield f"wrong-{kind}", says, partial(applied, change, case.expected, values)
+            yield f"wrong-{kind}", says, partial(map, change, case.expected, values)
 
 
 SLIPS = {
@@ -168,14 +168,9 @@ def slips(case: Case) -> Iterator[Row]:
         yield name, says, partial(instead, case, answer, case.posed.arguments)
 
 
-def applied(change: Callable[..., Any], *columns: Sequence[Any]) -> list[Any]:
-    """The change of what stands in each place."""
-    return [change(*row) for row in zip(*columns, strict=True)]
-
-
-def instead(case: Case, answer: Callable, calls: Sequence[Sequence[Any]]) -> list[Any]:
+def instead(case: Case, answer: Callable, calls: Sequence[Sequence[Any]]) -> Iterable[Any]:
     """What another answer gives, or the right one for other arguments, in the form expected."""
-    return applied(like, case.given_by(answer, calls), case.expected)
+    return map(like, case.given_by(answer, calls), case.expected)
 
 
 def compared(rows: Callable[[Case], Iterator[Row]]) -> Callable[[Case], Said | None]:
@@ -338,9 +333,8 @@ def unused(case: Case) -> Said | None:
     else:
         form = "{}"
         mine, right = (set().union(*map(depends, side)) for side in case.formulas)
-        given = {name for values in case.posed.arguments for v in values for name in symbols(v)}
         numbers = any(not n.is_integer for f in case.formulas[0] for n in f.atoms(sp.Number))
-        missing = sorted((right & given if numbers else right) - mine)
+        missing = sorted((right & case.posed.given if numbers else right) - mine)
         extra = sorted(mine - right)
     if missing:
         which = ", ".join(map(form.format, missing))
@@ -361,8 +355,7 @@ def multiplied(case: Case, factor: sp.Rational) -> Iterator[str]:
             if any(map(np.any, right)) and case.agree(mine, right):
                 yield f"`{name}`"
         return
-    names = (set().union(*map(symbols, side)) for side in case.formulas)
-    for name in sorted(set.intersection(*names)):
+    for name in sorted(set.intersection(*map(symbols, case.formulas))):
         mine, right = (
             [f.xreplace({s: factor * s for s in f.free_symbols if s.name == name}) for f in side]
             for side in case.formulas

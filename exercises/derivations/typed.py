@@ -161,12 +161,11 @@ class _Lines(Reader):
         minus = False
         for sign, part in [(1, inner), *reversed(parts)]:
             tree = self.read(part)
-            # -a + b: the sign of a term, not a sum in a sum
-            if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:
-                sign, tree = sign * tree.data[0], tree.parts[0]
-            # -a*b is -(a*b)
-            elif kind == PRODUCT and not trees and tree.kind == SUM and len(tree.parts) == 1:
-                minus, tree = tree.data == (-1,), tree.parts[0]
+            negative = tree.kind == SUM and len(tree.parts) == 1
+            if negative and kind == SUM:  # -a + b: the sign of a term, not a sum in a sum
+                sign, tree = -sign, tree.parts[0]
+            elif negative and not trees:  # -a*b is -(a*b)
+                minus, tree = True, tree.parts[0]
             signs.append(sign)
             trees.append(tree)
         tree = Node(kind, tuple(trees), tuple(signs))

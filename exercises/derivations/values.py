@@ -96,7 +96,7 @@ class Values:
     def __init__(self, setting: Setting, trees: list[Node], points: int = TRIED, seed: str = ""):
         self.setting, self.points, self.seed = setting, points, seed
         self.letters: dict[str, Array] = {}
-        # of each tree, beside a random letter at the nodes and with it anywhere else
+        # of each tree as long as it lives: inside of a mean, and outside
         self.kept = {inside: WeakKeyDictionary[Node, Array]() for inside in (True, False)}
         opened = [setting.meanings[name] for name in setting.opened(*trees) & {*setting.meanings}]
         highest = dict.fromkeys(setting.law.random, 0.0)
@@ -230,15 +230,10 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
         A mean is not computed here.
     """
     values = Values(setting, [first, second])
-    (a, size_a), (b, size_b) = map(values.sized, (first, second))
+    value, size = np.stack([values.sized(first), values.sized(second)], axis=1)
     with np.errstate(all="ignore"):
-        same = np.abs(a - b) <= ROUNDING * (size_a + size_b)
-        defined = np.array(
-            [
-                np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value)))
-                for value, size in ((a, size_a), (b, size_b))
-            ]
-        )
+        same = np.abs(value[0] - value[1]) <= ROUNDING * size.sum(axis=0)
+        defined = np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value)))
     positive = defined.all(axis=0) & (np.arange(values.points) < values.points / 3)
     if positive.sum() < FEWEST:
         return NO_VALUE

@@ -112,9 +112,9 @@ def described(
 
 
 def _moment(slip: Slip) -> str:
-    if slip.kind == "moment" and not slip.order:
-        return ": the mean of a function, a square or a product is not that of means"
-    return f": it takes a moment of order {slip.order} for another one" if slip.order else ""
+    if slip.order:
+        return f": it takes a moment of order {slip.order} for another one"
+    return ": the mean of a function, a square or a product is not that of means"
 
 
 def _role(setting: Setting, name: str) -> str:
@@ -131,9 +131,8 @@ def _role(setting: Setting, name: str) -> str:
 def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str) -> str:
     """Which rule the right step uses: the definition, if the line above is a name; else by what the
     step has done away with."""
-    bare = name.rstrip("0123456789")
-    if name and bare in DEFINITIONS[setting.kind]:
-        return DEFINITIONS[setting.kind][bare]
+    if definition := DEFINITIONS[setting.kind].get(name.rstrip("0123456789")):
+        return definition
     kind = slip.kind if slip else ""
     lost = letters(above) - letters(line)
     noises = lost & set(setting.law.noises)
