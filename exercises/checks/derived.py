@@ -205,8 +205,7 @@ def _open(posed: ToDerive, tree: Node | None) -> str:
     """What is still to be done after the last line; nothing if it is an end."""
     if tree is None or means_in(tree):
         return "In the last line a mean is still to be taken: go on until none is left."
-    left = sorted(letters(tree) - posed.ends)
-    if left:
+    if left := sorted(letters(tree) - posed.ends):
         return (
             f"The last line still has {', '.join(left)} in it: go on until only given letters "
             f"are left."

@@ -87,11 +87,10 @@ def results(case: Case) -> Iterator[Row]:
     for name, says, change in OF_RESULT:
         yield name, says, partial(map, change, case.expected)
     for decimals in range(1, 9) if case.numeric else ():
-        rounded = partial(np.round, decimals=decimals)
         yield (
             "low-precision",
             "It is rounded: hand in all digits.",
-            partial(map, rounded, case.expected),
+            partial(map, partial(np.round, decimals=decimals), case.expected),
         )
     for name, expected in case.others:
         yield (
@@ -130,8 +129,10 @@ def arguments(case: Case) -> Iterator[Row]:
         (f"the argument `{name}`", [values[i] for values in calls]) for i, name in enumerate(names)
     ]
     known += [(f"the result {name}", values) for name, values in case.others]
-    known += [("one", [1.0 if case.numeric else sp.S.One] * len(case.expected))]
+    known += [("one", [1] * len(case.expected))]
     for what, values in known:
+        if np.shape(values[0]) not in ((), np.shape(case.expected[0])):
+            continue
         for kind, of, change in (
             ("term", "", operator.sub),
             ("term", "", operator.add),
