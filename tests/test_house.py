@@ -196,8 +196,8 @@ ROOMS = {
     "benchmarks": 4_950,
     "book": 29_260,
     "exercises/*.py": 820,
-    "exercises/checks": 17_280,
-    "exercises/derivations": 14_500,
+    "exercises/checks": 16_510,
+    "exercises/derivations": 13_500,
     "exercises/grading": 14_900,
     "exercises/notebooks": 7_410,
     "exercises/sets": 42_040,
@@ -211,7 +211,7 @@ ROOMS = {
     "kfcourse/records": 5_460,
     "kfcourse/scenarios": 9_960,
     "kfcourse/symbolic": 18_520,
-    "tests": 169_960,
+    "tests": 169_980,
 }
 OF_LAYOUT = {
     tokenize.COMMENT,

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.exercises.checks.equality import equal
 from kfcourse.exercises.checks.question import Answer
 from kfcourse.exercises.checks.reference import Posed, given_by, part_of
 from kfcourse.limits import OutOfTime
 
 CALLS = 3  # with which dependence on an argument is looked for
+FELT = 1e-12  # relative difference of results
 
 
 @dataclass(frozen=True)
@@ -66,11 +68,6 @@ class Case:
         return list(zip(self.answered, self.expected, strict=True))
 
     @property
-    def numbers(self) -> list[np.ndarray]:
-        """All numbers of both sides."""
-        return [np.concatenate([*map(np.ravel, side)]) for side in (self.answered, self.expected)]
-
-    @property
     def formulas(self) -> list[list[sp.Expr]]:
         """All formulas of both sides."""
         return [sp.flatten(side) for side in (self.answered, self.expected)]
@@ -113,7 +110,7 @@ class Case:
             sides = self.with_changed(place, partial(varied, which=which))
             for side, before in enumerate((self.answered, self.expected)):
                 pairs = zip(sides[side], before, strict=False)
-                feels[side] |= any(not same(new, old) for new, old in pairs)
+                feels[side] |= any(not equal(new, old, FELT, {}) for new, old in pairs)
         return feels
 
 
@@ -144,13 +141,6 @@ def varied(value: Any, which: int) -> Any:
         np.flip,
     )
     return changed(value, changes[which])
-
-
-def same(first: Any, second: Any) -> bool:
-    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    return a.shape == b.shape and bool(
-        np.allclose(a, b, rtol=1e-12, atol=1e-12 * np.max(np.abs(b), initial=0.0), equal_nan=True)
-    )
 
 
 def changed(value: Any, change: Callable[[Any], Any]) -> Any:

@@ -19,8 +19,8 @@ from kfcourse.exercises.checks.equality import Unusable
 from kfcourse.exercises.checks.question import PASSED, WRONG, Question, Result
 from kfcourse.exercises.derivations import DerivationError, Report, Verdict, check_text
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
-from kfcourse.exercises.derivations.terms import Node, has_mean, letter, letters, written
-from kfcourse.exercises.derivations.values import EQUAL, Uncomputed, compare
+from kfcourse.exercises.derivations.terms import Node, letter, letters, means_in, written
+from kfcourse.exercises.derivations.values import are_equal
 from kfcourse.exercises.derivations.verdicts import (
     AGAIN,
     BEGINS,
@@ -129,26 +129,23 @@ class Derivation(Question):
         earned, wrong = min(right, COUNTED), steps - right
         share = earned / (earned + max(wrong, 1)) * (0.5 if open_end else 1.0)
         if slip is not None:
-            kinds = slip.kinds or (slip.status,)
-            return self._wrong(_says(report, slip, right, steps), kinds, share)
-        if open_end:
+            says, kinds = _says(report, slip, right, steps), slip.kinds or (slip.status,)
+        elif open_end:
             so_far = (
-                f"right so far, {steps} of {steps} steps. " if steps else "nothing is derived yet. "
+                f"right so far, {steps} of {steps} steps." if steps else "nothing is derived yet."
             )
-            return self._wrong(so_far + open_end, ("open-end",), share)
-        if chain.end is None or not _is(posed, chain.end):
+            says, kinds = f"{so_far} {open_end}", ("open-end",)
+        elif not _is(posed, chain.end):
             says = (
                 f"each line follows from the one above it, but the end is not {posed.name}: a "
                 f"name was given another meaning."
             )
-            return self._wrong(says, ("other-meaning",), 0.0)
-        if shown := _not_shown(posed, chain):
-            says = f"the end is right. {shown}"
-            return self._wrong(says, ("steps-missing",), 1 / posed.fewest)
-        return Result(self.name, self.title, PASSED, "right", share=1.0)
-
-    def _wrong(self, says: str, diagnosis: tuple[str, ...], share: float) -> Result:
-        return Result(self.name, self.title, WRONG, says, diagnosis, share)
+            kinds, share = ("other-meaning",), 0.0
+        elif shown := _not_shown(posed, chain):
+            says, kinds, share = f"the end is right. {shown}", ("steps-missing",), 1 / posed.fewest
+        else:
+            return self.result(PASSED, "right", share=1.0)
+        return self.result(WRONG, says, diagnosis=kinds, share=share)
 
 
 def _read(posed: ToDerive, text: str) -> tuple[Report, Derived]:
@@ -206,12 +203,9 @@ def _counted(report: Report, name: str) -> tuple[int, int]:
 
 def _open(posed: ToDerive, tree: Node | None) -> str:
     """What is still to be done after the last line; nothing if it is an end."""
-    if tree is None:
-        return "The last line cannot be read."
-    if has_mean(tree):
+    if tree is None or means_in(tree):
         return "In the last line a mean is still to be taken: go on until none is left."
-    left = sorted(letters(tree) - posed.ends)
-    if left:
+    if left := sorted(letters(tree) - posed.ends):
         return (
             f"The last line still has {', '.join(left)} in it: go on until only given letters "
             f"are left."
@@ -219,17 +213,16 @@ def _open(posed: ToDerive, tree: Node | None) -> str:
     return ""
 
 
-def _is(posed: ToDerive, tree: Node) -> bool:
+def _is(posed: ToDerive, tree: Node | None) -> bool:
     """Whether the last line is what the name means, whatever other names were given in the text."""
-    try:
-        return compare(of_side(posed.setting, posed.name), tree, letter(posed.name)) == EQUAL
-    except Uncomputed:
-        return False
+    return tree is not None and are_equal(
+        of_side(posed.setting, posed.name), tree, letter(posed.name)
+    )
 
 
 def _not_shown(posed: ToDerive, chain: Derived) -> str:
     trees = [verdict.tree for verdict in chain.verdicts if verdict.tree is not None]
-    if posed.averages and not any(map(has_mean, trees)):
+    if posed.averages and not any(map(means_in, trees)):
         return "But a derivation is asked for: begin with a mean M[...], and take a step a line."
     if len({written(tree) for tree in trees}) < posed.fewest:
         return (

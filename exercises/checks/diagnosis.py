@@ -107,17 +107,15 @@ class Wrong:
 
     def example(self) -> str:
         """One input for which the answer is wrong, and what it gives there."""
-        agree, sizes = self.posed.agree, [sum(map(np.size, v)) for v in self.posed.arguments]
-        _, call, case = min(
-            (
-                (sizes[call], call, case)
-                for case in self.cases
-                for call, (mine, right) in enumerate(case.pairs)
-                if not agree([mine], [right])
-            ),
-            key=lambda wrong: wrong[:2],
-        )
-        return shown(self.posed, call, *case.pairs[call], case.name)
+        sizes = [sum(map(np.size, values)) for values in self.posed.arguments]
+        wrong = [
+            (call, case)
+            for case in self.cases
+            for call, (mine, right) in enumerate(case.pairs)
+            if not case.agree([mine], [right])
+        ]
+        call, case = min(wrong, key=lambda place: (sizes[place[0]], place[0]))
+        return shown(case, call)
 
 
 def _lead(mistakes: Sequence[Mistake]) -> Lead:

@@ -8,6 +8,7 @@ catalogue are changes of one node of its syntax.
 from __future__ import annotations
 
 import ast
+import copy
 import inspect
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
@@ -71,14 +72,11 @@ def rebound(key: Answer, answers: dict[str, Answer]) -> Answer:
 
 def _source(function: FunctionType) -> str:
     """The source without the docstring, whose formulas look like the code."""
-    lines = inspect.getsource(function).splitlines(keepends=True)
-    (definition,) = ast.parse("".join(lines)).body
+    source = inspect.getsource(function)
+    (definition,) = ast.parse(source).body
     first = definition.body[0]  # type: ignore[attr-defined]
-    return (
-        "".join(lines[: first.lineno - 1] + lines[first.end_lineno :])
-        if inspect.getdoc(function)
-        else "".join(lines)
-    )
+    text = ast.get_source_segment(source, first) if function.__doc__ else ""
+    return source.replace(str(text), "", 1)
 
 
 def _built(
@@ -151,15 +149,14 @@ def changes(node: ast.AST, names: Sequence[str] = ()) -> Iterator[tuple[str, ast
                 yield kind, ast.BinOp(left, opposite(), right)
             if isinstance(op, ast.MatMult):
                 yield "other-order", ast.BinOp(right, op, left)
-            lost = LOST.get(type(op), "")
-            if lost:
+            if lost := LOST.get(type(op)):
                 yield lost, left
-            if lost and isinstance(op, ast.Add | ast.Mult | ast.MatMult):
-                yield lost, right
-            if isinstance(op, ast.Sub):
-                yield lost, ast.UnaryOp(ast.USub(), right)
-            if isinstance(op, ast.Div):
-                yield lost, ast.BinOp(ast.Constant(1), op, right)
+                if isinstance(op, ast.Sub):
+                    yield lost, ast.UnaryOp(ast.USub(), right)
+                elif isinstance(op, ast.Div):
+                    yield lost, ast.BinOp(ast.Constant(1), op, right)
+                elif not isinstance(op, ast.Pow):
+                    yield lost, right
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             yield "one-sign-wrong", operand
         case ast.Attribute(value=value, attr="T"):
@@ -181,26 +178,17 @@ def changed_keys(key: Answer) -> Iterator[tuple[str, Answer]]:
     sources = {name: _source(function) for name, function in pieces(key).items()}
     for letters in (False, True):  # of which there are many
         for name, source in sources.items():
-            nodes = [] if "while " in source else list(ast.walk(ast.parse(source)))
+            tree = ast.parse("" if "while " in source else source)
+            nodes = list(ast.walk(tree))
             names = sorted({node.arg for node in nodes if isinstance(node, ast.arg)})
             fixed = [node.iter for node in nodes if isinstance(node, ast.For | ast.comprehension)]
-            left = {id(node) for loop in fixed for node in ast.walk(loop)}
-            for place, node in enumerate(nodes):
-                if isinstance(node, ast.Name) is letters and id(node) not in left:
-                    for number, (kind, _) in enumerate(changes(node, names)):
-                        text = _changed(source, place, number, names)
-                        yield kind, _built(key, {**sources, name: text})
+            left = [node for loop in fixed for node in ast.walk(loop)]
+            for node in nodes:
+                if isinstance(node, ast.Name) is letters and node not in left:
+                    for kind, new in changes(node, names):
+                        yield kind, _built(key, {**sources, name: replaced(tree, node, new)})
 
 
-def _changed(source: str, place: int, number: int, names: Sequence[str]) -> str:
-    """The source with one of the changes of one node."""
-    tree = ast.parse(source)
-    old = list(ast.walk(tree))[place]
-    _, new = list(changes(old, names))[number]
-    for parent in ast.walk(tree):
-        for field, value in ast.iter_fields(parent):
-            if value is old:
-                setattr(parent, field, new)
-            elif isinstance(value, list):
-                value[:] = [new if entry is old else entry for entry in value]
-    return ast.unparse(ast.fix_missing_locations(tree))
+def replaced(tree: ast.AST, old: ast.AST, new: ast.AST) -> str:
+    """The source of a tree with another node in the place of one."""
+    return ast.unparse(copy.deepcopy(tree, {id(old): new}))

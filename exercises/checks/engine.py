@@ -113,7 +113,7 @@ def _fits(result: Any, wanted: Any) -> bool:
 
 
 def _frames(error: BaseException) -> list[traceback.FrameSummary]:
-    return list(traceback.extract_tb(error.__traceback__))
+    return traceback.extract_tb(error.__traceback__)
 
 
 def _foreign(frame: traceback.FrameSummary) -> bool:
@@ -168,9 +168,11 @@ def check(
             "The check itself failed, and that is not your fault. It counts for nothing; "
             "please tell your teacher."
         )
-        return Result(question.name, question.title, NOT_CHECKED, says, trouble=_trouble(error))
+        return question.result(NOT_CHECKED, says, trouble=_trouble(error))
     if result.status == WRONG:
         past.wrong[question.name] = answer
+    if result.passed:
+        past.given.pop(question.name, None)
     return result
 
 
@@ -195,31 +197,23 @@ class _Check:
     def question(self) -> Question:
         return self.posed.question
 
-    @property
-    def exercise(self) -> Exercise:
-        return self.posed.exercise
-
-    def _says(self, status: str, message: str, **more: Any) -> Result:
-        return Result(self.question.name, self.question.title, status, message, **more)
-
     def result(self) -> Result:
         try:
             answered = call(self.answer, self.posed.arguments, self.posed.expected, self.seconds)
-        except Missing:
-            return self._says(MISSING, "not implemented yet")
-        except Unusable as reason:
-            return self._says(UNUSABLE, str(reason))
-        if isinstance(self.question, Derivation):
-            return self._derived(self.question, answered)
-        try:
+            if isinstance(self.question, Derivation):
+                return self._derived(self.question, answered)
             with time_limit(self.seconds):
-                if self.posed.agree(answered, self.posed.expected):
-                    self.past.given.pop(self.question.name, None)
-                    return self._says(PASSED, "right", share=1.0)
+                right = self.posed.agree(answered, self.posed.expected)
+        except Missing:
+            return self.question.result(MISSING, "not implemented yet")
+        except Unusable as reason:
+            return self.question.result(UNUSABLE, str(reason))
         except OutOfTime:
-            return self._says(
+            return self.question.result(
                 UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it"
             )
+        if right:
+            return self.question.result(PASSED, "right", share=1.0)
         try:
             # what other arguments and other keys lead to is no news
             with (
@@ -229,24 +223,20 @@ class _Check:
             ):
                 return self._wrong(answered)
         except OutOfTime:
-            return self._says(WRONG, f"not right. {GENERAL}")
+            return self.question.result(WRONG, f"not right. {GENERAL}")
         # of ours: the answer is wrong all the same, only the hint is lost
         except Exception as error:
-            return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
+            return self.question.result(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
 
     def _derived(self, question: Derivation, answered: list[str]) -> Result:
         try:
             with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
-                judged = question.judge(self.exercise, answered[0])
-        except Unusable as reason:
-            return self._says(UNUSABLE, str(reason))
+                judged = question.judge(self.posed.exercise, answered[0])
         except OutOfTime:
-            return self._says(
-                UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
-            )
-        if judged.passed:
-            self.past.given.pop(question.name, None)
-        elif self._times(answered) and question.advice:
+            raise Unusable(
+                f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps"
+            ) from None
+        if not judged.passed and self._times(answered) and question.advice:
             return replace(judged, message=f"{judged.message} {question.advice}")
         return judged
 
@@ -258,12 +248,14 @@ class _Check:
                 f"this step is right on top of your {' and '.join(follows)}; what is not right "
                 f"yet is there: look there first."
             )
-            return self._says(WRONG, says, diagnosis=(FOLLOWS,), share=wrong.share, follows=follows)
+            return self.question.result(
+                WRONG, says, diagnosis=(FOLLOWS,), share=wrong.share, follows=follows
+            )
         message, names, explained = wrong.description()
         advice = self.question.advice if times else ""
         example = not explained or times > bool(self.question.advice)
         message = " ".join(filter(None, [message, advice, wrong.example() if example else ""]))
-        return self._says(WRONG, message, diagnosis=tuple(names), share=wrong.share)
+        return self.question.result(WRONG, message, diagnosis=tuple(names), share=wrong.share)
 
     def _times(self, answered: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""
@@ -280,7 +272,7 @@ class _Check:
             return ()
         earlier = {
             question.function: question
-            for question in self.exercise.questions.values()
+            for question in self.posed.exercise.questions.values()
             if question.name in self.past.wrong
         }
         own = [function for function in earlier if function in uses(own_step)]
@@ -299,7 +291,7 @@ class _Check:
     def _in_form(self, question: Question) -> Answer:
         """A wrong answer to an earlier question with results in the form of the key's, as our own
         functions take them."""
-        key, wrong = question.answer(self.exercise), self.past.wrong[question.name]
+        key, wrong = question.answer(self.posed.exercise), self.past.wrong[question.name]
 
         def in_form(*values: Any) -> Any:
             (mine,), (ours,) = (given_by(answer, [values]) for answer in (wrong, key))

@@ -109,9 +109,9 @@ def _formulas(answer: Any, expected: sp.MatrixBase) -> sp.ImmutableMatrix:
 
 
 def _array(answer: Any, expected: np.ndarray) -> np.ndarray:
-    if isinstance(answer, bool | np.bool_ | str) or answer is None:
-        raise Unusable(f"expected {_wanted(expected)}, got {describe(answer)}")
     try:
+        if isinstance(answer, bool | np.bool_ | None):
+            raise TypeError
         if isinstance(answer, sp.MatrixBase) and expected.ndim < 2:
             answer = list(answer)
         array = np.asarray(answer)
@@ -164,16 +164,17 @@ def equal(
         )
     if isinstance(second, str):
         return bool(first == second)
-    if isinstance(second, sp.MatrixBase):
-        return getattr(first, "shape", None) == second.shape and equal_formulas(
-            list(first), list(second), values, places
+    if isinstance(second, sp.Basic | sp.MatrixBase):
+        return np.shape(first) == np.shape(second) and equal_formulas(
+            sp.flatten([first]), sp.flatten([second]), values, places
         )
-    if isinstance(second, sp.Basic):
-        return isinstance(first, sp.Basic) and equal_formulas([first], [second], values, places)
+    return first.shape == second.shape and bool(near(first, second, tolerance).all())
+
+
+def near(first: np.ndarray, second: np.ndarray, tolerance: float) -> np.ndarray:
+    """Where numbers are equal to a tolerance that is relative, also to the largest of all."""
     scale = np.max(np.abs(second[np.isfinite(second)]), initial=0.0)
-    return first.shape == second.shape and bool(
-        np.allclose(first, second, rtol=tolerance, atol=tolerance * scale, equal_nan=True)
-    )
+    return np.isclose(first, second, rtol=tolerance, atol=tolerance * scale, equal_nan=True)
 
 
 def equal_formulas(
@@ -236,7 +237,7 @@ def _value(
     number: int,
     signs: frozenset[tuple[sp.Symbol, int]],
     both: bool,
-    place: frozenset[tuple[sp.Symbol, sp.Expr]] = frozenset(),
+    place: frozenset[tuple[sp.Symbol, sp.Expr]],
 ) -> sp.Expr:
     """The value at a random point: parameters with their own sign, other symbols of both signs, or
     positive only.

@@ -177,7 +177,7 @@ class Exercise:
     @cached_property
     def places(self) -> list[Mapping[sp.Symbol, sp.Expr]]:
         """Steps at which formulas are compared, if the model has a switch."""
-        return places(self.model) if self.model.timed else []
+        return places(self.model)
 
     def known(self, k: int) -> dict[sp.Symbol, float]:
         """Values of k, t and the inputs at step k, for `subs`; empty where the model depends on

@@ -10,25 +10,27 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.exercises.checks.case import Case
+from kfcourse.exercises.checks.equality import near
 from kfcourse.exercises.checks.reference import Posed
 
 NUMBERS = 9  # that are shown of one array
 DECIMALS = (1.3, 0.7, 2.1, 0.4, 1.7, 0.9, 2.6, 0.6)  # values of symbols that have none
 
 
-def shown(posed: Posed, call: int, answered: Any, expected: Any, part: str) -> str:
-    """A sentence: for the arguments of this call the answer, or the part of it that is called so,
-    gives this.
+def shown(case: Case, call: int) -> str:
+    """A sentence: for the arguments of this call the answer, or this part of it, gives this.
 
     Of what is expected only the place where they differ is used.
     """
-    if isinstance(expected, np.ndarray):
-        where, value = _of_array(posed, call, answered, expected)
+    answered, expected = case.pairs[call]
+    if case.numeric:
+        where, value = _of_array(case.posed, call, answered, expected)
     else:
-        where, value = _of_formula(posed, call, answered)
+        where, value = _of_formula(case.posed, call, answered)
     if value is None:
         return ""
-    yours = f"result {part} is" if part else "function gives"
+    yours = f"result {case.name} is" if case.name else "function gives"
     return f"An example{where} your {yours} {_numbers(value)}."
 
 
@@ -58,11 +60,8 @@ def _of_array(
     axes, tolerance = posed.question.axes, posed.question.tolerance
     place: tuple[int, ...] = ()
     if axes and answered.ndim >= len(axes):
-        scale = np.max(np.abs(expected[np.isfinite(expected)]), initial=0.0)
-        near = np.isclose(
-            answered, expected, rtol=tolerance, atol=tolerance * scale, equal_nan=True
-        )
-        place = tuple(np.argwhere(~near)[0, : len(axes)].tolist())
+        wrong = np.argwhere(~near(answered, expected, tolerance))
+        place = tuple(wrong[0, : len(axes)].tolist())
     sizes = expected.shape[: len(place)]
     inputs = []
     for name, value in zip(posed.names, posed.arguments[call], strict=True):

@@ -23,15 +23,12 @@ def unposed(variant: Variant) -> Finding | None:
         for name, question in exercise.questions.items():
             try:
                 result = exercise.check(name, question.answer(exercise))
+                trouble = result.trouble
             except Exception as error:  # whatever a degenerate model leads to
+                trouble = f"{type(error).__name__}: {error}"
+            if trouble:
                 return Finding(
-                    False,
-                    f"question {name} of the exercises cannot be posed ({type(error).__name__}: "
-                    f"{error})",
-                )
-            if result.trouble:
-                return Finding(
-                    False, f"question {name} of the exercises cannot be posed ({result.trouble})"
+                    False, f"question {name} of the exercises cannot be posed ({trouble})"
                 )
             if not result.passed:
                 return Finding(

@@ -113,6 +113,10 @@ class Question:
         """The right answer for an exercise."""
         return answer_for(exercise, self.key)
 
+    def result(self, status: str, message: str, **more: Any) -> Result:
+        """What a check says of an answer to it."""
+        return Result(self.name, self.title, status, message, **more)
+
 
 @dataclass
 class Attempts:
@@ -168,12 +172,8 @@ class Result:
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
         data = {
-            "question": self.question,
-            "status": self.status,
-            "diagnosis": list(self.diagnosis),
-            "message": self.message,
-            "share": self.share,
-            "follows": list(self.follows),
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in vars(self).items()
+            if name != "title" and (value or name != "trouble")
         }
-        data |= {"trouble": self.trouble} if self.trouble else {}
         return {"text/plain": repr(self), MIME: data}

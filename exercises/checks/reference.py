@@ -55,10 +55,15 @@ class Posed:
         return known
 
     @cached_property
+    def given(self) -> set[str]:
+        """Names of the symbols that an answer is called with."""
+        return symbols(value for values in self.arguments for value in values)
+
+    @cached_property
     def values(self) -> dict[sp.Symbol, Any]:
         """Of the parameters: of the model's symbols that are no arguments of the answer."""
-        given = {name for values in self.arguments for v in values for name in symbols(v)}
-        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
+        values = self.exercise.model.values
+        return {s: value for s, value in values.items() if s.name not in self.given}
 
     def in_form(self, answer: Answer) -> list[Any]:
         """What an answer gives for the hidden arguments, in the form of what is expected."""
@@ -99,6 +104,6 @@ def part_of(results: Sequence[Any], place: int | None) -> list[Any]:
     return list(results) if place is None else [result[place] for result in results]
 
 
-def symbols(value: Any) -> set[str]:
-    """Names of the symbols in a formula; none in anything else."""
-    return {s.name for s in getattr(value, "free_symbols", ())}
+def symbols(values: Iterable[Any]) -> set[str]:
+    """Names of the symbols in formulas; none in anything else."""
+    return {s.name for value in values for s in getattr(value, "free_symbols", ())}

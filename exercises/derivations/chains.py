@@ -24,6 +24,7 @@ from kfcourse.symbolic.formula import check_name
 from kfcourse.symbolic.model import Model
 
 MOST_LINES = 400
+_PIECE = re.compile(r"(?:^|=)\s*([^=]*)")
 
 FindModel = Callable[[str], Model]
 
@@ -79,7 +80,9 @@ def read_chains(text: str, find: FindModel | None, setting: Setting | None = Non
             goes_on = False
             setting = _heading(line.strip(), number, setting, find)
             continue
-        pieces = _pieces(line, number)
+        pieces = [
+            Typed(number, piece.start(1), piece[1].rstrip()) for piece in _PIECE.finditer(line)
+        ]
         if pieces[0].text:
             chains.append(Chain(setting))
             goes_on = True
@@ -92,15 +95,6 @@ def read_chains(text: str, find: FindModel | None, setting: Setting | None = Non
             pieces = pieces[1:]
         chains[-1].links += pieces
     return chains
-
-
-def _pieces(line: str, number: int) -> list[Typed]:
-    pieces, column = [], 0
-    for piece in line.split("="):
-        start = column + len(piece) - len(piece.lstrip())
-        pieces.append(Typed(number, start, piece.strip()))
-        column += len(piece) + 1
-    return pieces
 
 
 def _heading(line: str, number: int, setting: Setting, find: FindModel | None) -> Setting:

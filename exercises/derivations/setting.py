@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 import sympy as sp
@@ -33,22 +32,8 @@ from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.sides import Side, taylor
 
 KINDS = ("gaussian", "linearised")
-OF_FILTERS = (
-    "y",
-    "K",
-    "R",
-    "lambda",
-    "Psi",
-    "m",
-    "d",
-    "z",
-    "p",
-    "tau",
-    "Theta",
-    "h",
-    "G",
-    "F",
-)  # letters of a filter's equations
+# letters of a filter's equations
+OF_FILTERS = ("y", "K", "R", "lambda", "Psi", "m", "d", "z", "p", "tau", "Theta", "h", "G", "F")
 
 
 @dataclass(frozen=True)
@@ -73,11 +58,11 @@ class Law:
     def at(self, mean: str, cov: str) -> Law:
         """The same with other letters for mean and covariance; components are numbered."""
         n = len(self.states)
-        if n == 1:
-            return replace(self, means=(mean,), cov=((cov,),))
-        pairs = [[f"{cov}{min(i, j) + 1}{max(i, j) + 1}" for j in range(n)] for i in range(n)]
+        numbers = [f"{i + 1}" for i in range(n)] if n > 1 else [""]
         return replace(
-            self, means=tuple(f"{mean}{i + 1}" for i in range(n)), cov=tuple(map(tuple, pairs))
+            self,
+            means=tuple(mean + i for i in numbers),
+            cov=tuple(tuple(cov + min(i, j) + max(i, j) for j in numbers) for i in numbers),
         )
 
 
@@ -106,10 +91,6 @@ class Setting:
     known: frozenset[str] | None = None
     model: Model | None = None
     kind: str = "gaussian"
-
-    @cached_property
-    def variances(self) -> frozenset[str]:
-        return frozenset(self.law.cov[i][i] for i in range(len(self.law.states)))
 
     def problem(self, name: str) -> str | None:
         """What is wrong with a letter; None if it may be used."""
@@ -178,67 +159,48 @@ def with_functions(setting: Setting) -> Setting:
     if setting.model is None:
         return setting
     model, law = setting.model, setting.law
-    n = len(law.states)
-    own = (
-        {s.name for s in (*model.x, *model.v, *model.w)} | set(model.parameters) | set(law.letters)
-    )
-    meanings: dict[str, Node] = {}
-    if setting.kind == "gaussian":
-        for first, second, equations in (
-            ("tau", "Theta", model.state_equation),
-            ("h", "F", model.meter_equation),
-        ):
-            meanings |= _moments(first, second, [tree_of(equation) for equation in equations], own)
-        for i, equation in enumerate(model.meter_equation):
-            for j, x in enumerate(model.x):
-                meanings[_entry("G", i, j, model.p, n)] = mean(tree_of(sp.diff(equation, x)))
-    else:
-        meanings |= _linearised(model, law)
-    meanings |= {
-        name: tree_of(equation)
-        for name, equation in zip(model.measured, model.meter_equation, strict=True)
+    own = {*law.random, *law.letters, *model.parameters}
+    at_law = {
+        "mean": sp.ImmutableMatrix([symbol(name) for name in law.means]),
+        "cov": sp.ImmutableMatrix([[symbol(name) for name in row] for row in law.cov]),
     }
+    meanings: dict[str, Node] = {}
+    for first, second, which in (("tau", "Theta", "object"), ("h", "F", "meter")):
+        side = replace(Side.of(model, which), **at_law)
+        size = len(side.equation)
+        names = [first if size == 1 else f"{first}{i + 1}" for i in range(size)]
+        values, slopes, covariances = (
+            _means(side, names, own)
+            if setting.kind == "gaussian"
+            else map(_trees, taylor(side)[:3])
+        )
+        meanings |= {name: value for name, (value,) in zip(names, values, strict=True)}
+        for name, rows in ((second, covariances), *([("G", slopes)] if first == "h" else [])):
+            for i, row in enumerate(rows):
+                for j, entry in enumerate(row):
+                    place = f"{i + 1}{j + 1}" if len(rows) * len(row) > 1 else ""
+                    meanings[name + place] = entry
+    meanings |= zip(model.measured, map(tree_of, model.meter_equation), strict=True)
     return replace(
         setting, meanings={name: tree for name, tree in meanings.items() if name not in own}
     )
 
 
-def _entry(name: str, i: int, j: int, rows: int, columns: int) -> str:
-    return name if rows == columns == 1 else f"{name}{i + 1}{j + 1}"
+def _trees(formulas: sp.MatrixBase) -> list[list[Node]]:
+    return [[tree_of(formula) for formula in row] for row in formulas.tolist()]
 
 
-def _moments(first: str, second: str, equations: list[Node], taken: set[str]) -> dict[str, Node]:
-    """Means and covariances of equations; a covariance is around the mean's own letter, so that it
-    follows what was derived."""
-    size = len(equations)
-    names = [first if size == 1 else f"{first}{i + 1}" for i in range(size)]
-    meanings = {name: mean(equation) for name, equation in zip(names, equations, strict=True)}
-    for i in range(size):
-        for j in range(i, size):
-            deviations = [
-                difference(
-                    equations[k], meanings[names[k]] if names[k] in taken else letter(names[k])
-                )
-                for k in (i, j)
-            ]
-            tree = mean(power(deviations[0], 2) if i == j else product(*deviations))
-            meanings[_entry(second, i, j, size, size)] = meanings[
-                _entry(second, j, i, size, size)
-            ] = tree
-    return meanings
-
-
-def _linearised(model: Model, law: Law) -> dict[str, Node]:
-    """The equations and their slopes at the mean, and A p A^T + B B^T."""
-    own_mean = sp.ImmutableMatrix([symbol(name) for name in law.means])
-    own_cov = sp.ImmutableMatrix([[symbol(name) for name in row] for row in law.cov])
-    meanings: dict[str, sp.Expr] = {}
-    for first, second, which in (("tau", "Theta", "object"), ("h", "F", "meter")):
-        side = replace(Side.of(model, which), mean=own_mean, cov=own_cov)
-        value, slope, covariance, _ = taylor(side)
-        for name, matrix in ((second, covariance), *([("G", slope)] if first == "h" else [])):
-            for i, j in np.ndindex(*matrix.shape):
-                meanings[_entry(name, i, j, *matrix.shape)] = matrix[i, j]
-        for i, entry in enumerate(value):
-            meanings[first if len(value) == 1 else f"{first}{i + 1}"] = entry
-    return {name: tree_of(formula) for name, formula in meanings.items()}
+def _means(side: Side, names: list[str], own: set[str]) -> tuple[list[list[Node]], ...]:
+    """Means of equations, of their slopes, and covariances, around the mean's own letter, so that
+    they follow what was derived; around the mean itself where the model has that letter."""
+    equations = [tree for (tree,) in _trees(side.equation)]
+    deviations = [
+        difference(tree, mean(tree) if name in own else letter(name))
+        for tree, name in zip(equations, names, strict=True)
+    ]
+    slopes = _trees(side.equation.jacobian(side.x))
+    return (
+        [[mean(tree)] for tree in equations],
+        [[mean(slope) for slope in row] for row in slopes],
+        [[mean(power(a, 2) if a is b else product(a, b)) for b in deviations] for a in deviations],
+    )

@@ -9,7 +9,7 @@ points choose; the line with the change must then be equal to the one above, as 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
 from math import gcd, prod
@@ -42,7 +42,7 @@ from kfcourse.exercises.derivations.terms import (
     walk,
     written,
 )
-from kfcourse.exercises.derivations.values import ENTIRE, EQUAL, Uncomputed, Values, compare
+from kfcourse.exercises.derivations.values import ENTIRE, Values, are_equal
 from kfcourse.laws import Array
 
 CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly
@@ -86,6 +86,8 @@ class Slip:
         The term or bracket that is lost, of the line above.
     above : bool
         Whether the path is one of the line above: of the term that something else was made of.
+    more : float
+        An addition to the cost.
     """
 
     kind: str
@@ -94,6 +96,7 @@ class Slip:
     order: int = 0
     lost: Node | None = None
     above: bool = False
+    more: float = 0.0
 
 
 def term_path(root: Node, path: Path) -> Path:
@@ -127,22 +130,15 @@ def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
     return _Search(setting, line, above).best()
 
 
-@dataclass
 class _Search:
-    setting: Setting
-    line: Node
-    above: Node
-    values: Values = field(init=False)
-
-    def __post_init__(self) -> None:
-        both = [self.line, self.above]
-        free = {*self.setting.law.letters, *self.setting.opened(*both)}
-        self.pool = sorted(free)
-        self.values = Values(self.setting, both, points=len(free) + 10, seed="slip")
-        self.mine, self.theirs = (self.values.of(tree, keep=True) for tree in both)
-        inner = list(walk(self.above))
+    def __init__(self, setting: Setting, line: Node, above: Node):
+        self.setting, self.line, self.above = setting, line, above
+        self.pool = sorted({*setting.law.letters, *setting.opened(line, above)})
+        self.values = Values(setting, [line, above], points=len(self.pool) + 10, seed="slip")
+        self.mine, self.theirs = map(self.values.of, (line, above))
+        inner = list(walk(above))
         self.terms = [
-            (sign, term, multiplied(self.above, path))
+            (sign, term, multiplied(above, path))
             for path, node in inner
             if node.kind == SUM
             for sign, term in zip(node.data, node.parts, strict=True)
@@ -161,37 +157,33 @@ class _Search:
 
     def best(self) -> list[Slip]:
         """The cheapest that hold, one for each term."""
-        fitting = [
-            (cost + self._unlikely(slip), -len(slip.path), i, slip, tree)
-            for i, (cost, slip, tree) in enumerate(self.fitting())
-        ]
-        kept: list[tuple[float, Slip]] = []
-        for cost, _, _, slip, tree in sorted(fitting, key=lambda candidate: candidate[:3]):
-            if kept and cost > kept[0][0] + 1e-9:
+        fitting = [(self._cost(slip), slip, tree) for slip, tree in self.fitting()]
+        kept, least = list[Slip](), np.inf
+        for cost, slip, tree in sorted(fitting, key=lambda fit: (fit[0], -len(fit[1].path))):
+            if cost > least + 1e-9:
                 break
             place = self._place(slip)
             # around a term that is named already
-            if any(self._place(other)[: len(place)] == place for _, other in kept):
+            if any(self._place(other)[: len(place)] == place for other in kept):
                 continue
-            if self._equal(tree, self.line if slip.above or slip.kind == FORGOTTEN else self.above):
-                kept.append((cost, slip))
-        slips = [slip for _, slip in kept]
-        if slips and slips[0].kind == "doubled":  # either of the two
-            return slips[-1:]
-        return slips if len(slips) <= 2 else []
+            target = self.line if slip.above or slip.kind == FORGOTTEN else self.above
+            if are_equal(self.setting, tree, target):
+                kept.append(slip)
+                least = cost
+        if kept and kept[0].kind == "doubled":  # either of the two
+            return kept[-1:]
+        return kept if len(kept) <= 2 else []
 
     def _place(self, slip: Slip) -> Path:
         return term_path(self.above if slip.above else self.line, slip.path)
 
-    def fitting(self) -> Iterator[tuple[float, Slip, Node]]:
-        """Changes that give the right values: cost, slip, the changed tree."""
+    def fitting(self) -> Iterator[tuple[Slip, Node]]:
+        """Changes that give the right values: slip, the changed tree."""
         for name in [noise for noise in self.setting.law.noises if noise in letters(self.above)]:
             tree = replaced(self.above, {name: number(0)})
             if self._same(self.values.of(tree), self.mine):
-                yield COSTS[FORGOTTEN], Slip(FORGOTTEN, (), name), tree
+                yield Slip(FORGOTTEN, (), name), tree
         moments, count = list(self._moments()), 0
-        for wrong, right, _ in moments:
-            self.values.of(product(wrong, right), keep=True)
         for root, other in ((self.line, False), (self.above, True)):
             target = self.mine if other else self.theirs
             for path, node in walk(root):
@@ -199,7 +191,7 @@ class _Search:
                 changes = self._of_moments(path, node, outer, moments, other)
                 if not other:
                     changes = chain(changes, self._of_node(path, node, outer))
-                for cost, slip, new in changes:
+                for slip, new in changes:
                     count += 1
                     if count > MOST_TRIED:
                         return
@@ -207,7 +199,7 @@ class _Search:
                     if self._same(self.values.of(tree), target) and not self._nothing(
                         tree, path, slip.kind
                     ):
-                        yield cost, slip, tree
+                        yield slip, tree
         yield from self._lost()
 
     def _nothing(self, tree: Node, path: Path, kind: str) -> bool:
@@ -223,7 +215,7 @@ class _Search:
                 return bool(np.all(np.abs(left) <= 1e-9))
         return False
 
-    def _lost(self) -> Iterator[tuple[float, Slip, Node]]:
+    def _lost(self) -> Iterator[tuple[Slip, Node]]:
         """What the line lacks, if that is a number times powers of letters."""
         names = [name for name in self.pool if name not in self.setting.meanings]
         values, factors = self.theirs - self.mine, list[Node]()
@@ -240,34 +232,26 @@ class _Search:
         q = number(Fraction(float(np.median(values))).limit_denominator(60))
         tree = total(self.line, product(q, *factors))
         if self._same(self.values.of(tree), self.theirs):
-            yield COSTS["lost"], Slip("lost", (), " and ".join(powers)), tree
+            yield Slip("lost", (), " and ".join(powers)), tree
 
     def _of_moments(
         self, path: Path, node: Node, outer: Node | None, moments: list[Any], other: bool
-    ) -> Iterator[tuple[float, Slip, Node]]:
+    ) -> Iterator[tuple[Slip, Node]]:
         """A moment in the place of another; of the line above, the other way round."""
         if outer is None or outer.kind in (SUM, POWER):
             for wrong, right, order in moments:
                 pair = (wrong, right) if other else (right, wrong)
                 slip = Slip("moment", path, order=order, above=other)
-                cost = COSTS["moment"] + OF_THE_LINE_ABOVE * other
-                yield cost, slip, product(node, *pair, exponents=(1, 1, -1))
+                yield slip, product(node, *pair, exponents=(1, 1, -1))
 
-    def _of_node(
-        self, path: Path, node: Node, outer: Node | None
-    ) -> Iterator[tuple[float, Slip, Node]]:
-        """Changes of one node of the line: cost, slip, the new node."""
+    def _of_node(self, path: Path, node: Node, outer: Node | None) -> Iterator[tuple[Slip, Node]]:
+        """Changes of one node of the line: slip, the new node."""
         parts, data = node.parts, node.data
 
         def slip(
-            kind: str,
-            new: Node,
-            name: str = "",
-            below: Path = (),
-            more: float = 0,
-            lost: Any = None,
-        ) -> tuple[float, Slip, Node]:
-            return COSTS[kind] + more, Slip(kind, path + below, name, lost=lost), new
+            kind: str, new: Node, name: str = "", below: Path = (), **of: Any
+        ) -> tuple[Slip, Node]:
+            return Slip(kind, path + below, name, **of), new
 
         if node.kind == SUM:
             for i, part in enumerate(parts):
@@ -350,11 +334,14 @@ class _Search:
             return self._factors(node.parts[0]) * int(node.data)
         return [node] * bool(letters(node) & set(self.setting.law.states))
 
-    def _unlikely(self, slip: Slip) -> float:
-        """An addition to the cost of changing a term that is nothing, or that stands in the line
-        above as it is, where it stands: in a bracket that is multiplied, or not."""
-        if slip.above or slip.kind in (FORGOTTEN, "doubled", "extra", "lost"):
-            return 0.0
+    def _cost(self, slip: Slip) -> float:
+        """More for a change of a term that is nothing, or that stands in the line above as it is,
+        where it stands: in a bracket that is multiplied, or not."""
+        cost = COSTS[slip.kind] + slip.more
+        if slip.above:
+            return cost + OF_THE_LINE_ABOVE
+        if slip.kind in (FORGOTTEN, "doubled", "extra", "lost"):
+            return cost
         path = term_path(self.line, slip.path)
         value = self.values.of(at(self.line, path))
         if path:
@@ -364,13 +351,7 @@ class _Search:
             for sign, term, inside in self.terms
             if inside == multiplied(self.line, path)
         )
-        return 0.35 if stays or np.all(np.abs(value) <= 1e-10) else 0.0
-
-    def _equal(self, first: Node, second: Node) -> bool:
-        try:
-            return compare(self.setting, first, second) == EQUAL
-        except Uncomputed:  # with the change a mean would be of something that is not computed
-            return False
+        return cost + 0.35 * bool(stays or np.all(np.abs(value) <= 1e-10))
 
     def _same(self, a: Array, b: Array) -> bool:
         with np.errstate(all="ignore"):

@@ -74,9 +74,9 @@ def difference(left: Node, right: Node) -> Node:
     return total(left, right, signs=(1, -1))
 
 
-def walk(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
+def walk(node: Node) -> Iterator[tuple[Path, Node]]:
     """Every node with the way to it from the root."""
-    waiting = [(path, node)]
+    waiting: list[tuple[Path, Node]] = [((), node)]
     while waiting:
         path, node = waiting.pop()
         yield path, node
@@ -102,20 +102,16 @@ def letters(node: Node) -> set[str]:
     return {inner.data for _, inner in walk(node) if inner.kind == LETTER}
 
 
-def has_mean(node: Node) -> bool:
-    """Whether a mean is left to be taken in it."""
-    return any(inner.kind == MEAN for _, inner in walk(node))
+def means_in(node: Node) -> list[Node]:
+    """Means that are left to be taken."""
+    return [inner for _, inner in walk(node) if inner.kind == MEAN]
 
 
 def replaced(node: Node, names: dict[str, Node]) -> Node:
     """The tree with other nodes in the place of letters."""
     if node.kind == LETTER:
         return names.get(node.data, node)
-    return (
-        replace(node, parts=tuple(replaced(part, names) for part in node.parts))
-        if node.parts
-        else node
-    )
+    return replace(node, parts=tuple(replaced(part, names) for part in node.parts))
 
 
 def written(node: Node) -> str:
@@ -140,10 +136,7 @@ def _written(node: Node, strength: int) -> str:
         )
         own, text = 2, text[1:] if node.data[0] > 0 else f"1{text}"
     elif node.kind == POWER:
-        exponent = (
-            str(node.data) if node.data.denominator == 1 and node.data > 0 else f"({node.data})"
-        )
-        own, text = 3, f"{_written(node.parts[0], 4)}^{exponent}"
+        own, text = 3, f"{_written(node.parts[0], 4)}^{_written(number(node.data), 4)}"
     else:
         inner = _written(node.parts[0], 0)
         own, text = 4, f"M[{inner}]" if node.kind == MEAN else f"{node.data}({inner})"

@@ -35,7 +35,7 @@ MEANS = ("M", "D", "Cov")
 DEEPEST = 60  # brackets and functions, one in the other
 LONGEST = 600  # numbers, letters and operations of a line
 
-_OTHERWISE = re.compile(r"\^|\blambda\b")  # no formula of Python's as it stands
+_OTHERWISE = re.compile(r"(\^|\blambda\b)")  # no formula of Python's as it stands
 _IN_PYTHON = {"^": "**", "lambda": "lambda_"}
 
 
@@ -53,16 +53,13 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
     FormulaError
         With the problem, the text and a pointer to the column.
     """
-    pieces, columns, end = [], [], 0
-    for match in _OTHERWISE.finditer(text):
-        new = _IN_PYTHON[match[0]]
-        pieces += [text[end : match.start()], new]
-        columns += [
-            *range(end, match.start()),
-            *(min(match.start() + i, match.end() - 1) for i in range(len(new))),
-        ]
-        end = match.end()
-    python, columns = "".join([*pieces, text[end:]]), [*columns, *range(end, len(text) + 1)]
+    python, columns, end = "", list[int](), 0
+    for piece in _OTHERWISE.split(text):
+        new = _IN_PYTHON.get(piece, piece)
+        python += new
+        columns += [end + min(i, len(piece) - 1) for i in range(len(new))]
+        end += len(piece)
+    columns.append(end)
     try:
         formula, tree, offset = syntax(python)
         return _Lines(formula, offset, name, columns).read(tree)
@@ -94,8 +91,8 @@ class _Lines(Reader):
                 node,
                 f"the line has more than {LONGEST} numbers, letters and signs; split the step up",
             )
-        start, end = node.col_offset, node.end_col_offset or node.col_offset + 1
-        place = self.columns[self.offset + start], self.columns[self.offset + end - 1] + 1
+        start, end = self.offset + node.col_offset, self.offset + (node.end_col_offset or 0)
+        place = self.columns[start], self.columns[end - 1] + 1
         tree = self._tree(node)
         tree = replace(
             tree,
@@ -108,8 +105,7 @@ class _Lines(Reader):
     def _tree(self, node: ast.expr) -> Node:
         match node:
             case ast.Constant():
-                value = self.number(node)
-                return Node(NUMBER, data=Fraction(int(value.p), int(value.q)))
+                return Node(NUMBER, data=Fraction(str(self.number(node))))
             case ast.Name():
                 return self._letter(node)
             case ast.UnaryOp(op=ast.USub()):
@@ -165,12 +161,11 @@ class _Lines(Reader):
         minus = False
         for sign, part in [(1, inner), *reversed(parts)]:
             tree = self.read(part)
-            # -a + b: the sign of a term, not a sum in a sum
-            if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:
-                sign, tree = sign * tree.data[0], tree.parts[0]
-            # -a*b is -(a*b)
-            elif kind == PRODUCT and not trees and tree.kind == SUM and len(tree.parts) == 1:
-                minus, tree = tree.data == (-1,), tree.parts[0]
+            negative = tree.kind == SUM and len(tree.parts) == 1
+            if negative and kind == SUM:  # -a + b: the sign of a term, not a sum in a sum
+                sign, tree = -sign, tree.parts[0]
+            elif negative and not trees:  # -a*b is -(a*b)
+                minus, tree = True, tree.parts[0]
             signs.append(sign)
             trees.append(tree)
         tree = Node(kind, tuple(trees), tuple(signs))
@@ -189,17 +184,12 @@ class _Lines(Reader):
             raise self.fail(
                 node.right, f"the exponent is larger than {MAX_EXPONENT}, or too fine a fraction"
             )
-        return power(self.read(node.left), Fraction(exponent.p, exponent.q))
+        return power(self.read(node.left), Fraction(str(exponent)))
 
     def _mean(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
-        wanted = 2 if name == "Cov" else 1
-        if len(arguments) != wanted:
-            raise self.fail(
-                node,
-                "Cov takes two expressions: Cov[a, b]"
-                if wanted == 2
-                else f"{name} takes one expression: {name}[a]",
-            )
+        if len(arguments) != (2 if name == "Cov" else 1):
+            how = "two expressions: Cov[a, b]" if name == "Cov" else f"one expression: {name}[a]"
+            raise self.fail(node, f"{name} takes {how}")
         first, second = (self.read(argument) for argument in (arguments[0], arguments[-1]))
         if name == "M":
             return Node(MEAN, (first,))

@@ -9,12 +9,24 @@ sizes, \|a\| + \|b\| for a - b: rounding is relative to that.
 from __future__ import annotations
 
 import random
-from functools import lru_cache
+from fractions import Fraction
+from functools import lru_cache, reduce
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from kfcourse.exercises.derivations.setting import Setting
-from kfcourse.exercises.derivations.terms import LETTER, MEAN, NUMBER, POWER, PRODUCT, SUM, Node
+from kfcourse.exercises.derivations.terms import (
+    CALL,
+    LETTER,
+    MEAN,
+    NUMBER,
+    POWER,
+    PRODUCT,
+    SUM,
+    Node,
+    means_in,
+)
 from kfcourse.laws import Array
 
 ENTIRE = ("exp", "sin", "cos", "sinh", "cosh")  # functions that may stand in a mean
@@ -29,11 +41,6 @@ NO_MEAN = (
     "take the rest out of M[...]"
 )
 
-_FUNCTIONS = {
-    name: getattr(np, {"atan": "arctan", "abs": "abs"}.get(name, name))
-    for name in ("sin", "cos", "tan", "atan", "exp", "log", "sinh", "cosh", "tanh", "abs")
-}
-
 
 class Uncomputed(ValueError):
     """A line has no value that could be compared, or a mean that is not computed here."""
@@ -46,27 +53,21 @@ class Uncomputed(ValueError):
 def degrees(node: Node, setting: Setting) -> dict[str, float]:
     """A bound on the degree in each random letter; infinite inside a function; Uncomputed where no
     mean is computed."""
-    if node.kind == NUMBER or node.kind == MEAN:
-        if node.kind == MEAN:
-            degrees(node.parts[0], setting)
+    if node.kind in (NUMBER, MEAN):
         return {}
     if node.kind == LETTER:
+        if node.data in setting.law.random:
+            return {node.data: 1}
         meaning = setting.meanings.get(node.data)
-        return (
-            {node.data: 1}
-            if node.data in setting.law.random
-            else degrees(meaning, setting)
-            if meaning
-            else {}
-        )
+        return degrees(meaning, setting) if meaning else {}
     parts = [degrees(part, setting) for part in node.parts]
     names = {name for part in parts for name in part}
-    if node.kind == SUM:
-        return {name: max(part.get(name, 0) for part in parts) for name in names}
-    if node.kind == PRODUCT:
-        if any(part and e < 0 for e, part in zip(node.data, parts, strict=True)):
+    if node.kind in (SUM, PRODUCT):
+        product = node.kind == PRODUCT
+        if product and any(part and e < 0 for e, part in zip(node.data, parts, strict=True)):
             raise Uncomputed(node)
-        return {name: sum(part.get(name, 0) for part in parts) for name in names}
+        together = sum if product else max
+        return {name: together(part.get(name, 0) for part in parts) for name in names}
     if not names:
         return {}
     if node.kind == POWER:
@@ -78,16 +79,6 @@ def degrees(node: Node, setting: Setting) -> dict[str, float]:
     return dict.fromkeys(names, np.inf)
 
 
-def means(node: Node, setting: Setting) -> list[Node]:
-    """The means in a tree, also those in the meanings of its letters."""
-    if node.kind == LETTER:
-        meaning = setting.meanings.get(node.data)
-        return means(meaning, setting) if meaning else []
-    return ([node] if node.kind == MEAN else []) + [
-        inner for part in node.parts for inner in means(part, setting)
-    ]
-
-
 class Values:
     """Values of trees at the same random points.
 
@@ -96,50 +87,68 @@ class Values:
     setting : Setting
     trees : list of Node
         Those whose means must be exact; others with a power more still are.
-    positive : bool
-        Whether all letters are positive; otherwise those not declared so have both signs.
+    points : int
+        In a third of them all letters are positive; otherwise those not declared so have both
+        signs.
+    seed : str
     """
 
     def __init__(self, setting: Setting, trees: list[Node], points: int = TRIED, seed: str = ""):
-        self.setting, self.points = setting, points
-        highest: dict[str, float] = {}
-        for tree in trees:
-            for mean_ in means(tree, setting):
-                for name, degree in degrees(mean_.parts[0], setting).items():
-                    highest[name] = max(highest.get(name, 0), degree)
-        self.axes = {name: i for i, name in enumerate(setting.law.random)}
-        n = len(setting.law.states)
-        # a component is made of several normal numbers
-        most = max((highest.get(x, 0) for x in setting.law.states), default=0)
-        sizes = [
-            most if name in setting.law.states and n > 1 else highest.get(name, 0)
-            for name in setting.law.random
-        ]
-        self.nodes = [hermite(FUNCTION_NODES if np.isinf(s) else int(s) + 2) for s in sizes]
-        self.seed = seed
+        self.setting, self.points, self.seed = setting, points, seed
         self.letters: dict[str, Array] = {}
-        self._law()
-        self.kept: dict[tuple[int, bool], tuple[Node, Array, Array]] = {}
-
-    def of(self, node: Node, keep: bool = False) -> Array:
-        """Values at the points, (points,); NaN where there is none."""
-        return self.sized(node, keep)[0]
-
-    def sized(self, node: Node, keep: bool = False) -> tuple[Array, Array]:
-        """Values, and the sizes of the terms that they are made of."""
-        with np.errstate(all="ignore"):
-            value, size = self._value(node, False, keep)
-        first, second = (
-            np.broadcast_to(array.reshape(array.shape[0], -1)[:, 0], self.points)
-            for array in (value, size)
+        # of each tree as long as it lives: inside of a mean, and outside
+        self.kept = {inside: WeakKeyDictionary[Node, Array]() for inside in (True, False)}
+        opened = [setting.meanings[name] for name in setting.opened(*trees) & {*setting.meanings}]
+        highest = dict.fromkeys(setting.law.random, 0.0)
+        for tree in [*trees, *opened]:
+            for mean in means_in(tree):
+                for name, degree in degrees(mean.parts[0], setting).items():
+                    highest[name] = max(highest[name], degree)
+        # a component is made of several normal numbers
+        states = setting.law.states
+        highest |= dict.fromkeys(states, max((highest[x] for x in states), default=0.0))
+        self._at_nodes(
+            [hermite(FUNCTION_NODES if np.isinf(d) else int(d) + 2) for d in highest.values()]
         )
-        return first, second
+
+    def _at_nodes(self, rules: list[tuple[Array, Array]]) -> None:
+        """Weights, and random letters at the nodes, each rule on an axis of its own; a covariance
+        is positive definite."""
+        (_, *normal), (_, *self.weights) = (
+            np.meshgrid([0.0], *values, indexing="ij", sparse=True)
+            for values in zip(*rules, strict=True)
+        )
+        law, points = self.setting.law, self.points
+        n = len(law.states)
+        lower = np.zeros((points, n, n))
+        for i in range(n):
+            for j in range(i):
+                lower[:, i, j] = self._random(f"root/{i}/{j}") / 2
+            lower[:, i, i] = np.abs(self._random(f"root/{i}/{i}"))
+        cov = lower @ lower.transpose(0, 2, 1)
+        for i, j in np.ndindex(n, n):
+            self.letters[law.cov[i][j]] = cov[:, i, j]
+        self.inside = dict(zip(law.noises, normal[n:], strict=True))
+        for i, name in enumerate(law.states):
+            self.inside[name] = self._column(self.letter(law.means[i])) + sum(
+                self._column(lower[:, i, j]) * normal[j] for j in range(i + 1)
+            )
+
+    def of(self, node: Node) -> Array:
+        """Values at the points, (points,); NaN where there is none."""
+        return self.sized(node)[0]
+
+    def sized(self, node: Node) -> Array:
+        """Values, and the sizes of the terms that they are made of, (2, points)."""
+        with np.errstate(all="ignore"):
+            both = self._value(node, False)
+        return np.broadcast_to(both.reshape(2, -1), (2, self.points))
 
     def _column(self, values: Array) -> Array:
-        return values.reshape(-1, *[1] * len(self.axes))
+        return values.reshape(-1, *[1] * len(self.weights))
 
     def _random(self, name: str) -> Array:
-        positive = name in self.setting.positive or name in self.setting.variances
+        positive = name in self.setting.positive
         numbers = []
         for i in range(self.points):
             source = random.Random(f"{self.seed}{name}/{i}")
@@ -147,97 +156,54 @@ class Values:
             numbers.append(sign * source.uniform(0.4, 1.5))
         return np.array(numbers)
 
-    def _law(self) -> None:
-        """Points of a law: a positive definite covariance, and the normal letters on their axes."""
-        law = self.setting.law
-        n = len(law.states)
-        if n == 1:
-            self.roots = np.sqrt(self._random(law.cov[0][0]))[:, None, None]
-        else:
-            lower = np.array(
-                [[self._random(f"root/{i}/{j}") for j in range(n)] for i in range(n)]
-            ).transpose(2, 0, 1)
-            lower = np.tril(lower, -1) * 0.5 + np.abs(lower) * np.eye(n)
-            cov = lower @ lower.transpose(0, 2, 1)
-            self.roots = lower
-            for i in range(n):
-                for j in range(n):
-                    self.letters[law.cov[i][j]] = cov[:, i, j]
-
     def letter(self, name: str) -> Array:
         """Its values at the points, (points,)."""
         if name not in self.letters:
             self.letters[name] = self._random(name)
         return self.letters[name]
 
-    def _on_axis(self, name: str) -> Array:
-        """A random letter at the nodes."""
-        law, k = self.setting.law, self.axes[name]
+    def _value(self, node: Node, inside: bool) -> Array:
+        """Values and sizes, (2, points, nodes...); with random letters at the nodes inside a
+        mean."""
+        kept = self.kept[inside]
+        if node not in kept:
+            kept[node] = self._fresh(node, inside)
+        return kept[node]
 
-        def normal(axis: int) -> Array:
-            shape = [1] * (len(self.axes) + 1)
-            shape[axis + 1] = -1
-            return self.nodes[axis][0].reshape(shape)
-
-        if name in law.noises:
-            return normal(k)
-        value = self._column(self.letter(law.means[k]))
-        for j in range(k + 1):
-            value = value + self._column(self.roots[:, k, j]) * normal(j)
-        return value
-
-    def _value(self, node: Node, inside: bool, keep: bool) -> tuple[Array, Array]:
-        kept = self.kept.get((id(node), inside))
-        if kept is not None:
-            return kept[1], kept[2]
-        value, size = self._fresh(node, inside, keep)
-        if keep:
-            self.kept[id(node), inside] = node, value, size
-        return value, size
-
-    def _fresh(self, node: Node, inside: bool, keep: bool) -> tuple[Array, Array]:
-        if node.kind == NUMBER:
-            value = self._column(np.array([float(node.data)]))
-            return value, np.abs(value)
-        if node.kind == LETTER:
-            if node.data in self.setting.meanings:
-                return self._value(self.setting.meanings[node.data], inside, True)
-            value = (
-                self._on_axis(node.data)
-                if inside and node.data in self.axes
-                else self._column(self.letter(node.data))
-            )
-            return value, np.abs(value)
+    def _fresh(self, node: Node, inside: bool) -> Array:
+        if node.kind == LETTER and node.data in self.setting.meanings:
+            return self._value(self.setting.meanings[node.data], inside)
+        if node.kind in (NUMBER, LETTER):
+            if inside and node.data in self.inside:
+                value = self.inside[node.data]
+            elif node.kind == LETTER:
+                value = self._column(self.letter(node.data))
+            else:
+                value = self._column(np.array([float(node.data)]))
+            return np.stack([value, np.abs(value)])
         if node.kind == MEAN:
-            value, size = self._value(node.parts[0], True, keep)
-            for k, (_, weights) in enumerate(self.nodes):
-                if value.shape[k + 1] > 1:
-                    shape = [1] * value.ndim
-                    shape[k + 1] = -1
-                    value = (value * weights.reshape(shape)).sum(axis=k + 1, keepdims=True)
-                    size = (size * weights.reshape(shape)).sum(axis=k + 1, keepdims=True)
-            return value, size
-        parts = [self._value(part, inside, keep) for part in node.parts]
-        if node.kind == SUM:
-            value = size = self._column(np.zeros(1))
-            for sign, (part, its_size) in zip(node.data, parts, strict=True):
-                value, size = value + sign * part, size + its_size
-            return value, size
-        if node.kind == PRODUCT:
-            value = size = self._column(np.ones(1))
-            for e, (part, its_size) in zip(node.data, parts, strict=True):
-                value = value * part if e > 0 else value / part
-                size = size * its_size if e > 0 else size * its_size / part**2
-            return value, size
-        inner, its_size = parts[0]
+            both = self._value(node.parts[0], True)
+            for axis, weights in enumerate(self.weights, 2):
+                if both.shape[axis] > 1:
+                    both = (both * weights).sum(axis, keepdims=True)
+            return both
+        parts = [self._value(part, inside) for part in node.parts]
         if node.kind == POWER:
-            exponent = float(node.data)
-            value = np.abs(inner) ** exponent if node.data.numerator % 2 == 0 else inner**exponent
-            return value, its_size**exponent if exponent > 0 else np.abs(value) * (
-                its_size / np.abs(inner)
-            ) ** -exponent
-        value = _FUNCTIONS[node.data](inner)
-        return value, np.abs(value) + np.maximum(1, np.abs(value)) * its_size
+            return _power(parts[0], node.data)
+        if node.kind == CALL:
+            value = getattr(np, node.data)(parts[0][0])
+            return np.stack([value, np.abs(value) + np.maximum(1, np.abs(value)) * parts[0][1]])
+        pairs = list(zip(node.data, parts, strict=True))
+        if node.kind == PRODUCT:
+            return reduce(np.multiply, [p if e > 0 else _power(p, e) for e, p in pairs])
+        return reduce(np.add, [p if sign > 0 else np.stack([-p[0], p[1]]) for sign, p in pairs])
+
+
+def _power(both: Array, exponent: Fraction) -> Array:
+    inner, size = both
+    k = float(exponent)
+    value = np.abs(inner) ** k if exponent.numerator % 2 == 0 else inner**k
+    return np.stack([value, size**k if k > 0 else np.abs(value) * (size / np.abs(inner)) ** -k])
 
 
 @lru_cache
@@ -264,15 +230,10 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
         A mean is not computed here.
     """
     values = Values(setting, [first, second])
-    (a, size_a), (b, size_b) = values.sized(first), values.sized(second)
+    value, size = np.stack([values.sized(first), values.sized(second)], axis=1)
     with np.errstate(all="ignore"):
-        same = np.abs(a - b) <= ROUNDING * (size_a + size_b)
-        defined = np.array(
-            [
-                np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value)))
-                for value, size in ((a, size_a), (b, size_b))
-            ]
-        )
+        same = np.abs(value[0] - value[1]) <= ROUNDING * size.sum(axis=0)
+        defined = np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value)))
     positive = defined.all(axis=0) & (np.arange(values.points) < values.points / 3)
     if positive.sum() < FEWEST:
         return NO_VALUE
@@ -281,3 +242,11 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
     # Where only one side has a value, as log(c^2) has and 2 log(c) has not, they are equal for
     # positive letters only.
     return EQUAL if same[defined.any(axis=0)].all() else IF_POSITIVE
+
+
+def are_equal(setting: Setting, first: Node, second: Node) -> bool:
+    """Whether two trees are equal, and their means are computed here."""
+    try:
+        return compare(setting, first, second) == EQUAL
+    except Uncomputed:
+        return False

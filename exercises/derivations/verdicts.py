@@ -206,8 +206,7 @@ class _Checking:
     def _says(
         self, link: Typed, status: str, says: str = "", tree: Node | None = None, **more: Any
     ) -> None:
-        place = link.line, link.column, link.text
-        self.verdicts.append(Verdict(*place, status, says, tree=tree, **more))
+        self.verdicts.append(Verdict(*link, status, says, tree=tree, **more))
 
     def _judge(self, link: Typed, node: Node) -> None:
         """Judge one line."""

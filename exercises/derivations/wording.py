@@ -11,12 +11,12 @@ from kfcourse.exercises.derivations.setting import Setting
 from kfcourse.exercises.derivations.slips import Slip, named, term_path
 from kfcourse.exercises.derivations.terms import (
     CALL,
-    MEAN,
     POWER,
     SUM,
     Node,
     at,
     letters,
+    means_in,
     walk,
     written,
 )
@@ -112,16 +112,16 @@ def described(
 
 
 def _moment(slip: Slip) -> str:
-    if slip.kind == "moment" and not slip.order:
-        return ": the mean of a function, a square or a product is not that of means"
-    return f": it takes a moment of order {slip.order} for another one" if slip.order else ""
+    if slip.order:
+        return f": it takes a moment of order {slip.order} for another one"
+    return ": the mean of a function, a square or a product is not that of means"
 
 
 def _role(setting: Setting, name: str) -> str:
     law = setting.law
     if name in law.means:
         return "a mean"
-    if name in setting.variances:
+    if name in [row[i] for i, row in enumerate(law.cov)]:
         return "a variance"
     if name in law.letters:
         return "a covariance"
@@ -131,9 +131,8 @@ def _role(setting: Setting, name: str) -> str:
 def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str) -> str:
     """Which rule the right step uses: the definition, if the line above is a name; else by what the
     step has done away with."""
-    bare = name.rstrip("0123456789")
-    if name and bare in DEFINITIONS[setting.kind]:
-        return DEFINITIONS[setting.kind][bare]
+    if definition := DEFINITIONS[setting.kind].get(name.rstrip("0123456789")):
+        return definition
     kind = slip.kind if slip else ""
     lost = letters(above) - letters(line)
     noises = lost & set(setting.law.noises)
@@ -141,7 +140,7 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
         return RULES["noise"]
     states = set(setting.law.states)
     means, left = (
-        [mean_ for mean_ in _means(node) if letters(mean_) & states] for node in (above, line)
+        [mean for mean in means_in(node) if letters(mean) & states] for node in (above, line)
     )
     if kind == "moment" or len(means) > len(left):
         calls = any(inner.kind == CALL for mean in means for _, inner in walk(mean))
@@ -151,10 +150,6 @@ def rule(setting: Setting, slip: Slip | None, line: Node, above: Node, name: str
     if kind in ("power", "lost-factor") and slip and slip.name not in setting.law.random:
         return RULES["constant"]
     return RULES["sign" if kind == "sign" else "noise" if noises else "terms"]
-
-
-def _means(node: Node) -> list[Node]:
-    return [inner for _, inner in walk(node) if inner.kind == MEAN]
 
 
 def _squares(node: Node) -> int:

@@ -7,6 +7,7 @@ state; like terms.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
 from kfcourse.exercises.derivations.setting import Setting, of_model, of_side
-from kfcourse.exercises.derivations.terms import has_mean, written
+from kfcourse.exercises.derivations.terms import means_in, written
 from kfcourse.exercises.derivations.typed import tree_of
 from kfcourse.exercises.derivations.verdicts import check_text
 from kfcourse.limits import OutOfTime, time_limit
@@ -58,22 +59,15 @@ def stages(
     for term in sp.Add.make_args(sp.expand(inner)):
         outside, inside = term.as_independent(*model.x, *noises, as_Add=False)
         groups[inside] = groups.get(inside, 0) + outside
-    split = sp.Add(
-        *(
-            sp.factor(outside) * (1 if inside == 1 else M(inside))
-            for inside, outside in groups.items()
-        ),
-        evaluate=False,
-    )
-    quiet, closed = sp.S.Zero, sp.S.Zero
+    split, quiet, closed = list[sp.Expr](), sp.S.Zero, sp.S.Zero
     for inside, outside in groups.items():
+        factor = sp.factor(outside)
+        split.append(factor * (1 if inside == 1 else M(inside)))
         of_noise, of_state = inside.as_independent(*model.x, as_Add=False)
         mean_of_noise = law.mean_of(of_noise)
-        quiet += sp.factor(outside) * mean_of_noise * (1 if of_state == 1 else M(of_state))
-        closed += (
-            sp.factor(outside).subs(values) * mean_of_noise * without_expm1(law.mean_of(of_state))
-        )
-    return [M(inner), split, quiet, closed, sp.expand(closed)], law
+        quiet += factor * mean_of_noise * (1 if of_state == 1 else M(of_state))
+        closed += factor.subs(values) * mean_of_noise * without_expm1(law.mean_of(of_state))
+    return [M(inner), sp.Add(*split, evaluate=False), quiet, closed, sp.expand(closed)], law
 
 
 def without_expm1(formula: sp.Expr) -> sp.Expr:
@@ -103,7 +97,7 @@ def right_derivation(model: Model) -> Worked | None:
             (chain,) = check_text(text, None, setting).chains
     except (Exception, OutOfTime):  # of SymPy, at a formula that it cannot average
         return None
-    closed = chain.end is not None and not has_mean(chain.end)
+    closed = chain.end is not None and not means_in(chain.end)
     return Worked(model, name, text) if chain.right and closed else None
 
 
@@ -117,16 +111,11 @@ def worth_deriving(model: Model) -> str:
     sides = (("h", "F", model.meter_equation), ("tau", "Theta", model.state_equation))
     telling, other = [], []
     for first, second, equations in sides:
-        size = len(equations)
         for i, equation in enumerate(equations):
-            index = "" if size == 1 else f"{i + 1}"
-            curved = bool(
-                sp.Matrix([equation.diff(x) for x in model.x]).free_symbols & set(model.x)
-            )
-            telling += (
-                [(f"{second}{2 * index}" if model.n == 1 else f"{first}{index}")] if curved else []
-            )
-            other.append(f"{second}{2 * index}")
+            index = "" if len(equations) == 1 else f"{i + 1}"
+            if any(equation.diff(x).has(*model.x) for x in model.x):
+                telling.append(second + 2 * index if model.n == 1 else first + index)
+            other.append(second + 2 * index)
     return next(
         name for name in (*telling, *other, "h", "tau") if name in of_side(setting, name).meanings
     )
@@ -158,13 +147,7 @@ def derive(model: Model, name: str) -> str:
 def _definition(setting: Setting, name: str) -> str:
     """That of a variance of the measurement, in the letters y and h; nothing where a parameter has
     such a letter."""
-    digits = [c for c in name if c.isdigit()]
-    if not name.startswith("F") or len(set(digits)) > 1:
+    if not (variance := re.fullmatch(r"F((\d)\2)?", name)):
         return ""
-    index = digits[0] if digits else ""
-    needed = (f"y{index}", f"h{index}")
-    return (
-        f"M[({needed[0]} - {needed[1]})^2]"
-        if all(name in setting.meanings for name in needed)
-        else ""
-    )
+    y, h = (f"{letter}{variance[2] or ''}" for letter in "yh")
+    return f"M[({y} - {h})^2]" if {y, h} <= setting.meanings.keys() else ""

@@ -16,7 +16,7 @@ import pytest
 from weekly import WEEK
 
 from kfcourse.exercises.checks import Exercise, engine, exercise, sets
-from kfcourse.exercises.checks.editing import _changed, changes
+from kfcourse.exercises.checks.editing import changes, replaced
 from kfcourse.exercises.notebooks.master import read, render, solution
 
 SEED = int(os.environ.get("MUTANTS", WEEK))
@@ -24,9 +24,8 @@ SEED = int(os.environ.get("MUTANTS", WEEK))
 
 def mutants(source):
     """All sources with one change."""
-    nodes = enumerate(ast.walk(ast.parse(source)))
-    changed = [(place, i) for place, node in nodes for i, _ in enumerate(changes(node))]
-    return [_changed(source, *change, ()) for change in changed]
+    tree = ast.parse(source)
+    return [replaced(tree, node, new) for node in ast.walk(tree) for _, new in changes(node)]
 
 
 def written(lab):
