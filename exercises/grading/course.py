@@ -30,7 +30,7 @@ from kfcourse.exercises.grading.weights import Credit
 from kfcourse.exercises.notebooks.course_list import Student, read_assignment
 from kfcourse.exercises.notebooks.texts import clean
 from kfcourse.files import save
-from kfcourse.lab.variants import chosen_variants
+from kfcourse.lab.variants import load_variants
 
 
 def grade_folder(
@@ -130,7 +130,7 @@ def _warn(problem: str) -> None:
 
 def _course(path: Path, variants_file: Path | None) -> list[Student]:
     """The students, each with a variant that there is."""
-    known = [variant.name for variant in chosen_variants([], variants_file)]
+    known = [*load_variants(variants_file)]
     course = read_assignment(path, known)
     for student in course:
         if student.variant not in known:

@@ -14,7 +14,13 @@ from kfcourse.exercises.checks import sets
 from kfcourse.exercises.notebooks.course_list import assign, save_assignment
 from kfcourse.exercises.notebooks.jobs import Job, Outcome, make, run_all
 from kfcourse.exercises.notebooks.texts import clean, safe
-from kfcourse.lab.variants import VariantError, chosen_variants, read_variants, usable_variants
+from kfcourse.lab.variants import (
+    VariantError,
+    find_variant,
+    load_variants,
+    read_variants,
+    usable_variants,
+)
 from kfcourse.symbolic.jumping import JumpModel
 
 ASSIGNMENT = "assignment.csv"
@@ -38,9 +44,10 @@ def hand_out(
     faults: dict[str, VariantError] = {}
     if everything:
         variants, faults = usable_variants(variants_file)
+    elif names:
+        variants = {name: find_variant(name, variants_file) for name in names}
     else:
-        chosen = chosen_variants(names, variants_file)
-        variants = {variant.name: variant for variant in chosen}
+        variants = load_variants(variants_file)
     for variant in variants.values():
         variant.plain("the exercises")  # told once, not for each set
     if variants_file and (everything or not names):

@@ -155,13 +155,8 @@ class ContinuousModel:
     def time(self) -> sp.Symbol | None:
         """t, if the formulas contain it."""
         t = symbol("t")
-        named = t.name in self.parameters or t in self.x
-        return (
-            t
-            if not named
-            and any(matrix.has(t) for matrix in (self.drift, self.diffusion, self.signal))
-            else None
-        )
+        used = any(matrix.has(t) for matrix in (self.drift, self.diffusion, self.signal))
+        return t if used and t.name not in self.taken else None
 
     @property
     def taken(self) -> set[str]:
@@ -235,11 +230,8 @@ def compiled(
     model: ContinuousModel, arguments: Sequence[Entries], outputs: Sequence[Entries]
 ) -> Callable[..., Any]:
     """The generated function of the time and these arguments."""
-    numeric = [sp.Array(entries).subs(model.values) for entries in outputs]
-    time = [] if model.time is None else [[model.time]]
-    function = compile_function([*arguments, *time], numeric)
-    return (
-        (lambda t, *arrays: function(*arrays))
-        if model.time is None
-        else lambda t, *arrays: function(*arrays, np.array([t]))
+    function = compile_function(
+        [*arguments, [model.time or sp.Dummy()]],
+        [sp.Array(entries).subs(model.values) for entries in outputs],
     )
+    return lambda t, *arrays: function(*arrays, np.array([t]))

@@ -115,18 +115,10 @@ def usable_variants(
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
     """One variant by name; VariantError lists the names if there is no such."""
-    return chosen_variants([name], path)[0]
-
-
-def chosen_variants(names: Sequence[str], path: str | Path | None = None) -> list[Variant]:
-    """The variants of these names, each once, or all of `load_variants`; VariantError for
-    others."""
-    if not names:
-        return list(load_variants(path).values())
-    variants, faults = read_variants(path, names)
+    variants, faults = read_variants(path, [name])
     for fault in faults.values():
         raise fault
-    return list(variants.values())
+    return variants[name]
 
 
 def read_variants(

@@ -430,8 +430,6 @@ def test_stiff_equations_are_left_to_an_implicit_method(few):
     slow = np.sin(1) - (np.cos(1) + np.sin(1) ** 3) / c
     assert_allclose(tau, np.full((few, 1), slow), rtol=0, atol=2e-8)
     assert_allclose(Theta, np.full((few, 1, 1), 1 / (2 * c + 6 * np.sin(1) ** 2)), rtol=1e-4)
-    with pytest.raises(NotFinite, match=r"stiff, or turn .* 100 trajectories"):
-        gaussian(model).at(0).predict(np.zeros((100, 1)), np.ones((1, 1)))
     # 150 steps of many trajectories tell that 30,000 would not do; a drift that explodes is none
     with pytest.raises(NotFinite, match=r"stiff, or turn .* 20000 trajectories"):
         gaussian(model).at(0).predict(np.zeros((20_000, 1)), np.ones((1, 1)))

@@ -322,20 +322,6 @@ def test_the_particles_own_error_is_not_in_the_bound(linear):
     assert (doubt > allowed).all()
 
 
-def test_a_filter_that_fails_is_left_out(variant53):
-    exact = pointmass(variant53)
-
-    def fails(state, y):
-        if state.step == 1:
-            raise ValueError("it cannot")
-        return exact.step(state, y)
-
-    failing = replace(exact, step=fails)
-    result = compare([aof(gaussian(variant53)), failing], variant53, 100, 3, seed=1)
-    assert result.names == ("aof-gaussian",)
-    assert str(result.left_out["aof-exact"]) == "step 1: aof-exact failed: it cannot"
-
-
 # ---------------------------------------------------------------- who is better
 
 

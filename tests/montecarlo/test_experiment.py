@@ -175,16 +175,23 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
     def cancelling(state, y):
         yield gain(np.ones((1, 1)), np.array([[-165.0]]))
 
+    def fails(state, y):
+        raise ValueError("it cannot")
+
     size, options = (model, 300, 4, 1), {"jobs": 1}
     good = [duof(model), aof(gaussian(model))]
+    four = replace(good[1], name="four", step=fails)
     three = replace(good[0], name="three", equations=cancelling)
-    result = compare([broken("first"), good[0], broken("two"), three, good[1]], *size, **options)
+    bad = [broken("first"), broken("two"), three, four]
+    result = compare([*bad, *good], *size, **options)
     assert result.names == ("duof", "aof-gaussian")
     assert {name: why.kind for name, why in result.left_out.items()} == {
         "first": "infinite",
         "two": "infinite",
         "three": "negative",
+        "four": "",
     }
+    assert str(result.left_out["four"]) == "step 0: four failed: it cannot"
     infinite = "step 2: first became infinite or NaN although the trajectories are finite"
     assert infinite in str(result.left_out["first"])
     failed = "step 0: three failed: a covariance has the variance -165"
