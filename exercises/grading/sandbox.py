@@ -97,11 +97,13 @@ def was_killed(process: subprocess.Popen) -> bool:
 
 
 def end(process: subprocess.Popen) -> None:
-    """End a process with all that is still below it or in its session."""
-    with suppress(OSError), process:  # which closes its pipes, and waits
+    """End a process with all that is still below it or in its session.  Its output is not closed:
+    what has escaped may hold the pipe open, and closing would wait for the thread that reads."""
+    with suppress(OSError):
         end_with_all_below(process.pid)
         if os.name == "posix":
             os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def end_with_all_below(pid: int) -> None:

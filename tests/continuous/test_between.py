@@ -430,12 +430,9 @@ def test_stiff_equations_are_left_to_an_implicit_method(few):
     slow = np.sin(1) - (np.cos(1) + np.sin(1) ** 3) / c
     assert_allclose(tau, np.full((few, 1), slow), rtol=0, atol=2e-8)
     assert_allclose(Theta, np.full((few, 1, 1), 1 / (2 * c + 6 * np.sin(1) ** 2)), rtol=1e-4)
-    # 150 steps of many trajectories tell that 30,000 would not do; a drift that explodes is none
+    # 150 steps of many trajectories tell that 30,000 would not do
     with pytest.raises(NotFinite, match=r"stiff, or turn .* 20000 trajectories"):
         gaussian(model).at(0).predict(np.zeros((20_000, 1)), np.ones((1, 1)))
-    explodes = sampled("x**3 + x", "1", "x + w")
-    with pytest.raises(NotFinite, match="the moments become infinite"):
-        gaussian(explodes).at(0).predict(np.ones((100, 1)), np.ones((1, 1)))
 
 
 def test_many_trajectories_that_turn_fast_are_no_stiff_ones():
