@@ -213,10 +213,11 @@ class Comparison:
         `RESOLUTION`: a 95 % interval has a thousandth of the bound to each side.  Of variant 53
         these intervals hold true gaps and differences in 99 % of the cases, and in 85 % at the
         worst step of the worst filter; those of `mean_gap` hold 95 % (20,000 trajectories, 200
-        seeds, `benchmarks/intervals.py`).  Of variant 2 the three are 99, 92 and 94 %, of variant
-        7 93, 83 and 96 % (100 seeds).  Of variant 5 one trajectory in some thirty thousand carries
-        a part of the gap: its 100,000 hold 92 %, 69 % at the worst step of the linearised AOF, and
-        92 % in the mean (of fives of 90 comparisons with 20,000, which hold 85, 32 and 83 %).
+        seeds, `benchmarks/intervals.py`).  Of variant 2 the three are 99, 92 and 94 %, with 100
+        seeds of variant 6 99, 89 and 97 %, of variant 7 93, 83 and 96 %.  Of variant 5 one
+        trajectory in some thirty thousand carries a part of the gap: its 100,000 hold 92 %, 69 % at
+        the worst step of the linearised AOF, and 92 % in the mean (of fives of 90 comparisons with
+        20,000, which hold 85, 32 and 83 %).
         """
         return self._resolved(Estimate.jackknife(self._gap(name)), 1.0)
 
