@@ -39,8 +39,8 @@ from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
 # trajectories that may be stiff: the implicit method takes some tenths of a second each
 FEW = 64
-# between two measurements: many trajectories take seconds for them, and few are faster by the
-# implicit method; after a twentieth of the steps their length tells how many there will be
+# between two measurements, at most: more would take many trajectories minutes in all, and few are
+# faster by the implicit method; a twentieth of the steps shows by its length how many there will be
 STEPS = 3_000
 # of a mean that has no variance a part that stands for the standard deviation: a billionth of the
 # mean is then right by the usual accuracy

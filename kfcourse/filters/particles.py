@@ -244,7 +244,7 @@ class Sampler:
         rng = memory.generator(self.seed, len(y), k)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             x, mode, logs = self.drawn(rng, memory, y, k)
-            # of larger states the variances, by fourth powers, are infinite
+            # a state whose fourth power is no number is lost, as one is that is infinite
             lost = np.asarray(~np.isfinite(x**4).all(axis=-1))
             x = np.where(lost[..., None], self.modes[0].model.prior.mean, x)
             likelihoods = [each.log_likelihood(y[:, None, None], x, k) for each in self.modes]
@@ -334,7 +334,7 @@ class Mode(NamedTuple):
 def _wide(rng: np.random.Generator, law: Gaussian) -> tuple[Array, Array]:
     """s (..., r) by a mixture of a wider normal law and of N(0, I), and ln N(s; 0, I) / q."""
     shape, r = law.mean.shape[:-1], law.mean.shape[-1]
-    # 1e-14: what rounding may take from a nearly singular covariance of parts of 1
+    # the least variances of s may be smaller than the rounding of those near 1
     cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + 1e-14 * np.eye(r)
     root = WIDER * np.linalg.cholesky(cov)
     normal, plain = rng.standard_normal(law.mean.shape), rng.random(shape) < PRIOR

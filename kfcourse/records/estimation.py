@@ -135,11 +135,12 @@ def estimate(
 
     t = np.where(logs, np.log(np.where(logs, start, 1.0)), start)
     unit = np.where(logs | (start == 0), 1.0, np.abs(start))
-    # what else is wrong with the start is said there; beyond, squares of derivatives are infinite
+    # The likelihood itself says what else is wrong with the start.  The search squares derivatives:
+    # beyond 1e100 they overflow.
     if abs(log_likelihood(t)) > 1e100:
         raise ValueError(
             "at the start of the search the measurements are many powers of ten away from what "
-            "the model expects of them: look for the row, or change the units"
+            "the model expects of them: look for the one that is wrong, or change the units"
         )
     with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
         # the second time in the units that the likelihood has at its maximum

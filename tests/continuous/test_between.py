@@ -425,7 +425,7 @@ def test_stiff_equations_are_left_to_an_implicit_method(few):
     1 / (2 (c + 3 x^2)), but for 1 / c^2."""
     c = 1e5
     model = sampled("-1e5*(x - sin(t)) - x**3", "1", "x + w")
-    z, p = np.linspace(-1, 1, few)[:, None], np.linspace(0.1, 0.2, few)[:, None, None]
+    z, p = np.linspace(-1, 1, few)[:, None], np.full((few, 1, 1), 0.2)
     tau, Theta = gaussian(model).at(0).predict(z, p)
     slow = np.sin(1) - (np.cos(1) + np.sin(1) ** 3) / c
     assert_allclose(tau, np.full((few, 1), slow), rtol=0, atol=2e-8)

@@ -292,9 +292,9 @@ def test_an_odd_measurement_is_followed_or_refused(name, value):
     ("state", "meter"), [("x + (x - x**3)/10", "x"), ("x + 3*sin(2*x)/10", "x + x**3/10")]
 )
 def test_records_that_contradict_the_model_have_the_right_answer_or_none(state, meter):
-    """Jumps, lasting faults, ramps and alternations of .3 to 6, and a jump of 1000: a grid of logarithms, which cannot
-    underflow, says what is right.  At most two answers of a hundred err by more than three times
-    what is stated."""
+    """Jumps, lasting faults, ramps and alternations of .3 to 6, and a jump of 1000: a grid of
+    logarithms, which cannot underflow, says what is right.  At most two answers of a hundred err by
+    more than three times what is stated."""
     model = Model.define(f"{state} + 0.15*v", f"{meter} + 0.4*w")
     b, h = (sp.lambdify("x", formula, "numpy") for formula in (state, meter))
     x, k, rng = np.linspace(-9, 9, 361), np.arange(8), np.random.default_rng(5)

@@ -280,19 +280,20 @@ while pid > 1 and len(chain) < 3:
 for pid in chain[:2]:
     os.kill(pid, 9)
 """,
-    "leaves a daemon": '''
-import os, subprocess, sys
-code = """
+    # which holds the pipe in which its process speaks
+    "leaves a daemon": """
 import os, time
 if os.fork() == 0:
-    os.setsid()
-    if os.fork() == 0:
-        open({FLAG!r}, 'w').write(str(os.getpid()))
-        time.sleep(600)
-"""
-subprocess.run([sys.executable, '-c', code])
-import time; time.sleep(0.5)
-''',
+    try:
+        os.setsid()
+        if os.fork() == 0:
+            with open({FLAG!r}, 'w') as flag:
+                flag.write(str(os.getpid()))
+            time.sleep(600)
+    finally:
+        os._exit(0)
+time.sleep(0.5)
+""",
     "reads another notebook": "other = open({OTHER!r}).read()\nassert False, 'has read it'",
     "writes outside": "open({OUTSIDE!r}, 'w').write('x')\nassert False, 'has written it'",
     "uses the network": "import socket\nsocket.create_connection(('127.0.0.1', {PORT}), "
